@@ -38,127 +38,6 @@ from models.loops.criteria import GAIN_SD, NOT_WHITE
 from models.loops.lag_laws import attractor_torque, squeeze_film_torque
 from models.records.periods import Cycle
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LagProblem:
-    """The samples that slide: phase, speed, torque [n]; `absorbed` [n, s] spans zero and shapes, orthonormal."""
-
-    phase: FloatArray
-    speed: FloatArray
-    measured: FloatArray
-    absorbed: FloatArray
-    left: FloatArray  # measured, without what is absorbed
-    noise: float  # first guess, for the gain's prior
-
-    def without(self, column: FloatArray) -> FloatArray:
-        return np.asarray(column - self.absorbed @ (self.absorbed.T @ column), dtype=np.float64)
-
-    def gain(self, left: FloatArray) -> float:
-        weight = (self.noise / GAIN_SD) ** 2
-        return float((left @ self.left + weight) / (left @ left + weight))
-
-    def misfit(self, course: FloatArray) -> float:
-        """-2 log likelihood x noise², profiled over gain, zero and shapes."""
-        left = self.without(course)
-        gain = self.gain(left)
-        return float(np.square(self.left - gain * left).sum() + ((gain - 1) * self.noise / GAIN_SD) ** 2)
-
-    def linear(self, still: FloatArray, little: FloatArray, lag: float) -> tuple[float, float]:
-        """Deviation and estimate of u by linearising about no lag: it gives the sign."""
-        base = self.without(still)
-        change = self.without((little - still) / lag)
-        gain = self.gain(base)
-        residual = self.left - gain * base
-        orthogonal = change - base * float(base @ change) / float(base @ base)
-        strength = max(float(orthogonal @ orthogonal), 1e-300)
-        estimate = float(orthogonal @ residual) / strength
-        return self._deviation(residual - estimate * orthogonal) / math.sqrt(strength), estimate
-
-    def step(self, course: FloatArray, change: FloatArray, lag: float) -> tuple[float, float]:
-        """u after a Gauss-Newton step from `lag`, whose torque is `course` and changes by `change`, and the gain there."""
-        base, slope = self.without(course), self.without(change)
-        gain = self.gain(base)
-        orthogonal = slope - base * float(base @ slope) / float(base @ base)
-        move = float(orthogonal @ (self.left - gain * base)) / (gain * max(float(orthogonal @ orthogonal), 1e-300))
-        return lag + move, self.gain(base + move * slope)
-
-    def deviation(
-        self, course: FloatArray, change: FloatArray, lag: float, cycle: Cycle, *, scaled: bool, erring: FloatArray
-    ) -> tuple[float, float]:
-        """Deviation of u at the optimum (of gain x u/gain where the lag is `scaled` by the gain), and the gain there.
-
-        `erring` [k, n] Nm is how the torque changes where the curve errs by a deviation, in independent directions: what
-        that explains of the residual is no noise.
-        """
-        base, slope = self.without(course), self.without(change)
-        gain = self.gain(base)
-        residual = self.left - gain * base
-        directions = np.stack([self.without(way) for way in erring]) if len(erring) else erring
-        strength = directions @ directions.T
-        damped = strength + self.noise**2 * np.eye(len(erring))
-        residual -= np.linalg.solve(damped, directions @ residual) @ directions
-        sd = self._deviation(residual, taken=float(np.trace(np.linalg.solve(damped, strength))))
-        information = np.array([[base @ base + (self.noise / GAIN_SD) ** 2, gain * (base @ slope)], [0, 0]])
-        information[1] = information[0, 1], gain**2 * (slope @ slope)
-        variance = sd**2 * np.linalg.inv(information + 1e-12 * np.diag(np.diag(information)))
-        along = np.array([-lag / gain if scaled else 0.0, 1.0])
-        along_variance = max(float(along @ variance @ along), 0.0)
-        return math.hypot(math.sqrt(along_variance), self._by_phase(slope, course, gain, cycle)), gain
-
-    def _by_phase(self, slope: FloatArray, course: FloatArray, gain: float, cycle: Cycle) -> float:
-        """The part of the speed's own noise: an error of the phase opens a curve into a loop."""
-        order = np.argsort(np.mod(self.phase, 2 * math.pi))
-        turned = np.empty_like(course)
-        distinct = np.mod(self.phase[order], 2 * math.pi) + 1e-9 * np.arange(order.size)
-        turned[order] = np.gradient(course[order], np.maximum.accumulate(distinct))
-        shift = float(slope @ self.without(turned)) / (gain * max(float(slope @ slope), 1e-300))
-        count = cycle.cosine.size
-        lead = np.zeros(2 * count)
-        lead[0], lead[count] = -cycle.sine[0], cycle.cosine[0]
-        lead /= cycle.amplitude**2
-        return abs(shift) * math.sqrt(max(float(lead @ cycle.covariance @ lead), 0.0))
-
-    def _deviation(self, residual: FloatArray, taken: float = 0.0, blocks: int = 24) -> float:
-        """Of a sample; raised where the means over blocks of phase scatter more than white noise would make them.
-
-        `taken` degrees of freedom were taken out of the residual beside what is absorbed.
-        """
-        taken += self.absorbed.shape[1] + 2
-        free = max(residual.size - taken, 1)
-        variance = float(residual @ residual) / free
-        turn = np.mod(self.phase, 2 * math.pi)
-        block = np.minimum((turn * (blocks / (2 * math.pi))).astype(np.int64), blocks - 1)
-        count = np.bincount(block, minlength=blocks)
-        total = np.bincount(block, weights=residual, minlength=blocks)
-        filled = count > 0
-        freedom = max(int(filled.sum()) - taken, 4)
-        ratio = float((total[filled] ** 2 / count[filled]).sum()) / freedom / max(variance, 1e-300)
-        return math.sqrt(variance * (ratio if ratio > 1 + NOT_WHITE * math.sqrt(2 / freedom) else 1.0))
-
-
-def make_lag_problem(
-    cycle: Cycle, phase: FloatArray, measured: FloatArray, curve: StribeckParameters, count: int = 6, fewest: int = 20
-) -> LagProblem:
-    """The samples of torque [n] Nm at phase [n] rad that slide, `fewest` at least, with so many shapes beside the curve."""
-    speed = cycle.value(phase)
-    highest = float(speed.max())
-    rows = speed > 0.01 * highest  # slower it sticks or is next to it, and no stationary test goes there
-    if rows.sum() < fewest:
-        raise ValueError(f"at least {fewest} samples must slide, got {int(rows.sum())}")
-    phase, speed, measured = phase[rows], speed[rows], measured[rows]
-    span = max(highest - float(speed.min()), 1e-12)
-    shapes = np.polynomial.chebyshev.chebvander(2 * (speed - speed.min()) / span - 1, count + 1)
-    frame, _ = np.linalg.qr(np.column_stack([np.ones_like(speed), torque(speed, curve)]))
-    shapes = shapes[:, 1:] - frame @ (frame.T @ shapes[:, 1:])
-    vectors, sizes, _ = np.linalg.svd(shapes, full_matrices=False)
-    absorbed = np.column_stack([np.full(speed.size, speed.size**-0.5), vectors[:, sizes > 1e-6 * sizes[0]]])
-    absorbed, _ = np.linalg.qr(absorbed)
-    left = measured - absorbed @ (absorbed.T @ measured)
-    rough = np.diff(measured[np.argsort(speed)])
-    noise = max(1.4826 * float(np.median(np.abs(rough))) / math.sqrt(2), 1e-6 * float(np.abs(measured).max()), 1e-12)
-    return LagProblem(phase=phase, speed=speed, measured=measured, absorbed=absorbed, left=left, noise=noise)
-
-
 #: A parameter is moved by this share of its deviation.
 _MOVED = 0.01
 
@@ -242,14 +121,14 @@ def fit_lag(
     """
     posed = _Posed(law, cycle, phase, measured, curve.parameters)
     scanned = posed.at(law.lags)
-    misfits = [posed.problem.misfit(row) for row in scanned]
+    misfits = [posed.misfit(row) for row in scanned]
     best = int(np.argmin(misfits))
     none, first = posed.near_none(scanned[0])
     if first < -against * none or (best == 0 and first <= Z90 * none):
         slant = _by_curve(lambda moved: _Posed(law, cycle, phase, measured, moved).near_none()[1], curve)
         estimate = _Estimate(first, none, slant)
         status = LagStatus.AGAINST_THE_LAW if first < -against * estimate.sd else LagStatus.UNRESOLVED
-        return _result(posed.problem, torque(posed.problem.speed, curve.parameters), None, estimate, status)
+        return posed.result(torque(posed.speed, curve.parameters), None, estimate, status)
     lag = posed.refined(misfits, best)
     middle, change = posed.about(lag)
     courses: list[FloatArray] = []
@@ -261,11 +140,11 @@ def fit_lag(
 
     slant = _by_curve(stepped, curve)
     erring = _erring(courses, curve) if courses else np.zeros((0, middle.size))
-    sd, gain = posed.problem.deviation(middle, change, lag, cycle, scaled=law.scaled, erring=erring)
+    sd, gain = posed.deviation(lag, middle, change, erring)
     share = 1 / gain if law.scaled else 1.0
     estimate = _Estimate(lag * share, sd * share, slant)
     status = LagStatus.DETERMINED if estimate.lag > Z90 * estimate.sd else LagStatus.UNRESOLVED
-    return _result(posed.problem, middle, estimate.lag if status is LagStatus.DETERMINED else None, estimate, status)
+    return posed.result(middle, estimate.lag if status is LagStatus.DETERMINED else None, estimate, status)
 
 
 @dataclass(frozen=True, slots=True)
@@ -324,7 +203,11 @@ def _erring(courses: Sequence[FloatArray], curve: StationaryCurve) -> FloatArray
 
 
 class _Posed:
-    """A law and a curve put to a record: the law's torque in its periodic state, over a grid of phases."""
+    """A law and a curve put to the samples of a record that slide: phase, speed, torque [n].
+
+    `absorbed` [n, s] spans zero and shapes, orthonormal; `left` is the torque without it. The law's torque is computed in
+    its periodic state, over a grid of phases.
+    """
 
     def __init__(
         self,
@@ -334,9 +217,21 @@ class _Posed:
         measured: FloatArray,
         curve: StribeckParameters,
         steps: int = 1000,  # of a period
+        fewest: int = 20,  # samples
     ) -> None:
-        self.law, self.curve = law, curve
-        self.problem = make_lag_problem(cycle, phase, measured, curve)
+        self.law, self.cycle, self.curve = law, cycle, curve
+        speed = cycle.value(phase)
+        rows = speed > 0.01 * float(speed.max())  # slower it sticks or is next to it, and no stationary test goes there
+        if rows.sum() < fewest:
+            raise ValueError(f"at least {fewest} samples must slide, got {int(rows.sum())}")
+        self.phase, self.speed, self.measured = phase[rows], speed[rows], measured[rows]
+        self.absorbed = absorbed_beside(self.speed, curve)
+        self.left = self.without(self.measured)
+        rough = np.diff(self.measured[np.argsort(self.speed)])
+        # a first guess, for the gain's prior
+        self.noise = max(
+            1.4826 * float(np.median(np.abs(rough))) / math.sqrt(2), 1e-6 * float(np.abs(self.measured).max()), 1e-12
+        )
         self._steps = steps
         self._start = round(steps * min(max(0.5, 5.0 * cycle.frequency), 12.0))
         grid = 2 * math.pi * np.arange(-self._start, steps + 1) / steps
@@ -346,7 +241,7 @@ class _Posed:
     def at(self, lags: FloatArray) -> FloatArray:
         """The torque [k, n] Nm at lags [k]."""
         courses = self.law.respond(self._time, self._velocity, self.curve, lags[:, np.newaxis])[:, self._start :]
-        position = np.mod(self.problem.phase, 2 * math.pi) * (self._steps / (2 * math.pi))
+        position = np.mod(self.phase, 2 * math.pi) * (self._steps / (2 * math.pi))
         cell = np.minimum(position.astype(np.int64), self._steps - 1)
         part = position - cell
         return np.asarray(courses[:, cell] * (1 - part) + courses[:, cell + 1] * part, dtype=np.float64)
@@ -357,17 +252,42 @@ class _Posed:
         low, middle, high = self.at(np.array([lag - step, lag, lag + step]))
         return middle, (high - low) / (2 * step)
 
+    def without(self, column: FloatArray) -> FloatArray:
+        return np.asarray(column - self.absorbed @ (self.absorbed.T @ column), dtype=np.float64)
+
+    def gain(self, left: FloatArray) -> float:
+        weight = (self.noise / GAIN_SD) ** 2
+        return float((left @ self.left + weight) / (left @ left + weight))
+
+    def misfit(self, course: FloatArray) -> float:
+        """-2 log likelihood x noise², profiled over gain, zero and shapes."""
+        left = self.without(course)
+        gain = self.gain(left)
+        return float(np.square(self.left - gain * left).sum() + ((gain - 1) * self.noise / GAIN_SD) ** 2)
+
+    def near_none(self, little: FloatArray | None = None) -> tuple[float, float]:
+        """Deviation and estimate of the lag, linearised about none, which gives its sign; `little` [n] Nm is the torque at
+        the least lag."""
+        least = self.law.lags[:1]
+        still = torque(self.speed, self.curve)
+        little = self.at(least)[0] if little is None else little
+        base = self.without(still)
+        change = self.without((little - still) / float(least[0]))
+        residual = self.left - self.gain(base) * base
+        orthogonal = change - base * float(base @ change) / float(base @ base)
+        strength = max(float(orthogonal @ orthogonal), 1e-300)
+        estimate = float(orthogonal @ residual) / strength
+        return self._deviation(residual - estimate * orthogonal) / math.sqrt(strength), estimate
+
     def stepped(self, lag: float) -> tuple[float, FloatArray]:
         """The lag one Gauss-Newton step on, over its gain where the law is scaled, and the torque [n] Nm before it."""
         course, change = self.about(lag)
-        after, gain = self.problem.step(course, change, lag)
-        return after / gain if self.law.scaled else after, course
-
-    def near_none(self, little: FloatArray | None = None) -> tuple[float, float]:
-        """Deviation and estimate of the lag, linearised about none; `little` [n] Nm is the torque at the least lag."""
-        least = self.law.lags[:1]
-        row = self.at(least)[0] if little is None else little
-        return self.problem.linear(torque(self.problem.speed, self.curve), row, float(least[0]))
+        base, slope = self.without(course), self.without(change)
+        gain = self.gain(base)
+        orthogonal = slope - base * float(base @ slope) / float(base @ base)
+        move = float(orthogonal @ (self.left - gain * base)) / (gain * max(float(orthogonal @ orthogonal), 1e-300))
+        after = lag + move
+        return after / self.gain(base + move * slope) if self.law.scaled else after, course
 
     def refined(self, misfits: list[float], best: int) -> float:
         """The minimum about the best of the scan, in log u: three finer scans, each a ninth of the last, and a parabola."""
@@ -377,7 +297,7 @@ class _Posed:
         optimum, least = math.log(lags[best]), misfits[best]
         for _ in range(3):
             points = np.linspace(low, high, 9)
-            values = np.array([self.problem.misfit(row) for row in self.at(np.exp(points))])
+            values = np.array([self.misfit(row) for row in self.at(np.exp(points))])
             i = int(np.argmin(values))
             if values[i] <= least:
                 optimum, least = float(points[i]), float(values[i])
@@ -390,17 +310,76 @@ class _Posed:
             low, high = optimum - width, optimum + width
         return math.exp(optimum)
 
+    def deviation(self, lag: float, course: FloatArray, change: FloatArray, erring: FloatArray) -> tuple[float, float]:
+        """Deviation of u at the optimum (of gain x u/gain where the law is scaled), and the gain there.
 
-def _result(
-    problem: LagProblem, course: FloatArray, lag: float | None, estimate: _Estimate, status: LagStatus
-) -> LagFit:
-    left = problem.without(course)
-    miss = float(np.square(problem.left - problem.gain(left) * left).sum())
-    size = problem.measured.size
-    return LagFit(
-        lag=lag,
-        lag_sd=estimate.sd,
-        interval=estimate.interval(),
-        log_likelihood=-0.5 * size * math.log(max(miss, 1e-300) / size),
-        status=status,
-    )
+        `erring` [k, n] Nm is how the torque changes where the curve errs by a deviation, in independent directions: what
+        that explains of the residual is no noise.
+        """
+        base, slope = self.without(course), self.without(change)
+        gain = self.gain(base)
+        residual = self.left - gain * base
+        directions = np.stack([self.without(way) for way in erring]) if len(erring) else erring
+        strength = directions @ directions.T
+        damped = strength + self.noise**2 * np.eye(len(erring))
+        residual -= np.linalg.solve(damped, directions @ residual) @ directions
+        sd = self._deviation(residual, taken=float(np.trace(np.linalg.solve(damped, strength))))
+        information = np.array([[base @ base + (self.noise / GAIN_SD) ** 2, gain * (base @ slope)], [0, 0]])
+        information[1] = information[0, 1], gain**2 * (slope @ slope)
+        variance = sd**2 * np.linalg.inv(information + 1e-12 * np.diag(np.diag(information)))
+        along = np.array([-lag / gain if self.law.scaled else 0.0, 1.0])
+        along_variance = max(float(along @ variance @ along), 0.0)
+        return math.hypot(math.sqrt(along_variance), self._by_phase(slope, course, gain)), gain
+
+    def _by_phase(self, slope: FloatArray, course: FloatArray, gain: float) -> float:
+        """The part of the speed's own noise: an error of the phase opens a curve into a loop."""
+        order = np.argsort(np.mod(self.phase, 2 * math.pi))
+        turned = np.empty_like(course)
+        distinct = np.mod(self.phase[order], 2 * math.pi) + 1e-9 * np.arange(order.size)
+        turned[order] = np.gradient(course[order], np.maximum.accumulate(distinct))
+        shift = float(slope @ self.without(turned)) / (gain * max(float(slope @ slope), 1e-300))
+        count, cycle = self.cycle.cosine.size, self.cycle
+        lead = np.zeros(2 * count)
+        lead[0], lead[count] = -cycle.sine[0], cycle.cosine[0]
+        lead /= cycle.amplitude**2
+        return abs(shift) * math.sqrt(max(float(lead @ cycle.covariance @ lead), 0.0))
+
+    def _deviation(self, residual: FloatArray, taken: float = 0.0, blocks: int = 24) -> float:
+        """Of a sample; raised where the means over blocks of phase scatter more than white noise would make them.
+
+        `taken` degrees of freedom were taken out of the residual beside what is absorbed.
+        """
+        taken += self.absorbed.shape[1] + 2
+        free = max(residual.size - taken, 1)
+        variance = float(residual @ residual) / free
+        turn = np.mod(self.phase, 2 * math.pi)
+        block = np.minimum((turn * (blocks / (2 * math.pi))).astype(np.int64), blocks - 1)
+        count = np.bincount(block, minlength=blocks)
+        total = np.bincount(block, weights=residual, minlength=blocks)
+        filled = count > 0
+        freedom = max(int(filled.sum()) - taken, 4)
+        ratio = float((total[filled] ** 2 / count[filled]).sum()) / freedom / max(variance, 1e-300)
+        return math.sqrt(variance * (ratio if ratio > 1 + NOT_WHITE * math.sqrt(2 / freedom) else 1.0))
+
+    def result(self, course: FloatArray, lag: float | None, estimate: _Estimate, status: LagStatus) -> LagFit:
+        left = self.without(course)
+        miss = float(np.square(self.left - self.gain(left) * left).sum())
+        size = self.measured.size
+        return LagFit(
+            lag=lag,
+            lag_sd=estimate.sd,
+            interval=estimate.interval(),
+            log_likelihood=-0.5 * size * math.log(max(miss, 1e-300) / size),
+            status=status,
+        )
+
+
+def absorbed_beside(speed: FloatArray, curve: StribeckParameters, count: int = 6) -> FloatArray:
+    """Orthonormal columns [n, s]: 1, and so many single-valued shapes over speed [n] without their part along the curve."""
+    span = max(float(speed.max()) - float(speed.min()), 1e-12)
+    shapes = np.polynomial.chebyshev.chebvander(2 * (speed - speed.min()) / span - 1, count + 1)
+    frame, _ = np.linalg.qr(np.column_stack([np.ones_like(speed), torque(speed, curve)]))
+    shapes = shapes[:, 1:] - frame @ (frame.T @ shapes[:, 1:])
+    vectors, sizes, _ = np.linalg.svd(shapes, full_matrices=False)
+    absorbed = np.column_stack([np.full(speed.size, speed.size**-0.5), vectors[:, sizes > 1e-6 * sizes[0]]])
+    return np.asarray(np.linalg.qr(absorbed)[0])

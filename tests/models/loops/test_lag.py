@@ -201,7 +201,7 @@ def test_a_curve_wrong_in_shape_moves_the_attractor_little(monkeypatch):
     assert fit.status is LagStatus.DETERMINED
     assert 1 / fit.lag == pytest.approx(150.0, rel=0.08)
     # the control: with gain and zero alone to absorb it, C goes half as far again astray
-    monkeypatch.setattr(lag_fit, "make_lag_problem", partial(lag_fit.make_lag_problem, count=0))
+    monkeypatch.setattr(lag_fit, "absorbed_beside", partial(lag_fit.absorbed_beside, count=0))
     bare = fitted(ATTRACTOR, torque, wrong)
     assert abs(bare.lag * 150.0 - 1) > 1.3 * abs(fit.lag * 150.0 - 1)
     assert fit.log_likelihood > bare.log_likelihood
