@@ -28,8 +28,6 @@ def test_coefficients_alone_are_those_of_one_column_each_and_rounding_below_zero
     np.testing.assert_allclose(log_gain_alone(np.diag(info), score, sd), alone)
     assert log_gain(np.zeros((0, 0)), np.zeros(0), 1.0) == 0.0
     # what rounding leaves below zero counts as nothing
-    columns, data, sd = drawn(5)
-    info, score = columns.T @ columns, columns.T @ data
     with_nothing = np.pad(info, (0, 1)), np.append(score, 0.0), np.append(sd, 1e4)
     assert log_gain(*with_nothing) == pytest.approx(log_gain(info, score, sd))
     with_nothing[0][-1, -1] = -1e-7  # 1 + sd² info is negative

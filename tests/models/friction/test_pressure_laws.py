@@ -92,7 +92,6 @@ def test_laws_through_medians_are_the_laws_that_made_them_at_several_states_too(
         expected, rel=0.1
     )
     # a parameter over pressure at several states is its law at each
-    clutch = simulated_clutch(3)
     states, pressures = [0.0, 2_000.0, 9_000.0], np.linspace(4e5, 7e5, 5)
     for name in PARAMETER_NAMES:
         values = np.stack([getattr(clutch.parameters(PROTOCOL_PRESSURES, state), name) for state in states], axis=1)

@@ -24,10 +24,9 @@ def test_torque_is_eq_3_as_printed_and_odd_with_its_derivatives(values) -> None:
     # A complex step has no cancellation: equal to rounding.
     steps = np.eye(4) * 1e-30j
     witness = np.stack([_complex_eq3(values + step).imag / 1e-30 for step in steps], axis=1)
-    np.testing.assert_allclose(gradient(VELOCITY, parameters(values)), witness, rtol=1e-12, atol=1e-14)
+    np.testing.assert_allclose(gradient(VELOCITY, p), witness, rtol=1e-12, atol=1e-14)
     # Differences over 1e-5 of v: truncation 1e-10 and rounding 1e-11 of the torque over the step.
     h = 1e-5 * VELOCITY
-    p = parameters(values)
     witness = (torque(VELOCITY + h, p) - torque(VELOCITY - h, p)) / (2 * h)
     np.testing.assert_allclose(slope(VELOCITY, p), witness, rtol=1e-6, atol=1e-6)
     np.testing.assert_array_equal(slope(-VELOCITY, p), slope(VELOCITY, p))

@@ -8,14 +8,22 @@ from functools import partial
 import numpy as np
 import pytest
 from scipy.special import expit, log_ndtr
-from scipy.stats import multivariate_normal
+from scipy.stats import linregress, multivariate_normal
 
 from models.arrays import FloatArray
 from models.degradation import general_order
 from models.degradation.general_order import Degradation, first_passage
 from models.prognosis import ended_lives
 from models.prognosis.criteria import COURSE_DISCREPANCIES, COURSE_SCATTERS, COURSE_SIZE_SD, OTHER_KIND, VAGUE
-from models.prognosis.ended_lives import EndedLife, Kin, as_its_kind, declared_end, ended_life, representative
+from models.prognosis.ended_lives import (
+    EndedLife,
+    Kin,
+    as_its_kind,
+    declared_end,
+    ended_life,
+    representative,
+    severity_exponent,
+)
 from models.prognosis.first_passage import weighted_quantiles
 from models.prognosis.stated_end import stated_end
 from models.tracking.courses import FORM_SIZE, Course
@@ -186,7 +194,6 @@ def test_what_is_behind_stays_behind_and_one_draw_that_agrees_is_no_certainty() 
         assert given.sum() == pytest.approx(1.0)
         assert given[ends <= 660.0].sum() == pytest.approx(0.1)
     # Of a filter whose draws end, where at all, far from where the others did but for one.
-    kin = said(measured(1_100.0, 0.6), lives())
     own = np.concatenate([[1_100.0], np.geomspace(2_000.0, 1e6, 199), np.full(300, np.inf)])
     ends, given = replace(kin, lawful=1.0).together(own, np.full(500, 0.002), np.zeros(500, dtype=np.intp), 660.0)
     low, high = weighted_quantiles(np.minimum(ends, 1e6), given, (0.05, 0.5))
@@ -300,6 +307,16 @@ def test_uncertain_and_censored_ends_are_weighed_as_by_brute_force() -> None:
     stated = np.exp(ended_lives._predictive(values, variance, exact, VAGUE, (shape, rate)).log_density(at))
     expected, found = (weighted_quantiles(at, each / each.sum(), (0.05, 0.5, 0.95)) for each in (drawn, stated))
     assert np.exp(found) == pytest.approx(np.exp(expected), rel=0.02)
+
+
+def test_the_exponent_of_severity_is_that_of_a_line_through_logarithms() -> None:
+    work = np.array([1.0, 2.0, 4.0, 7.0])
+    ends = 1e4 * work**-1.5 * np.exp([0.1, -0.2, 0.05, 0.1])
+    line = linregress(np.log(work), np.log(ends))
+    assert severity_exponent(ends, work) == pytest.approx((-line.slope, line.stderr))
+    for too_little in ((ends[:2], work[:2]), (ends, np.ones(4))):
+        with pytest.raises(ValueError, match="lives under different work are needed, 3 or more"):
+            severity_exponent(*too_little)
 
 
 def test_a_life_that_was_taken_out_says_that_its_end_was_later() -> None:

@@ -96,7 +96,6 @@ def test_sure_tracks_give_eq_3_of_eq_6_and_end_where_it_passes_the_threshold() -
     lower, median, upper = found.band()
     assert ((lower <= median) & (median <= upper)).all()
     # ends of life are where the mean cof passes the threshold
-    found = paths([level()])
     fine = np.linspace(0.0, 20_000.0, 4_001)
     course = mean_cofs(fine)
     end = float(np.interp(-0.7 * course[0], -course, fine))

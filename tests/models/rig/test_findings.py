@@ -184,20 +184,19 @@ def test_the_coulomb_ratio_falls_with_pressure_towards_an_asymptote(life: Life) 
 def test_three_parameters_fall_over_life_and_the_viscous_one_rises_as_eq_6_alike_at_all_pressures(
     life: Life, name: str
 ) -> None:
-    values, deviations = (column[:, FIVE_BAR] for column in life.parameter(name))
+    all_values, all_deviations = life.parameter(name)
+    values, deviations = all_values[:, FIVE_BAR], all_deviations[:, FIVE_BAR]
     sign = 1 if name == RISING else -1
     change = sign * (values[-4:].mean() - values[0])
     assert change > 4 * deviations[0]
     assert sign * fitted_slope(life.cycles, values) > 0
     # and alike at all pressures
-    values, deviations = life.parameter(name)
-    weight = deviations**-2
+    weight = all_deviations**-2
     progress = progress_fraction(life.cycles, 4000.0, 0.8)[:, None]
     centred = progress - (weight * progress).sum(axis=0) / weight.sum(axis=0)
-    trend = (weight * centred * values).sum(axis=0) / (weight * centred**2).sum(axis=0)
+    trend = (weight * centred * all_values).sum(axis=0) / (weight * centred**2).sum(axis=0)
     assert (np.sign(trend) == sign).all()
     # equation 6 describes how a parameter evolves
-    values, deviations = (column[:, FIVE_BAR] for column in life.parameter(name))
 
     def miss(x: FloatArray) -> FloatArray:
         law = Degradation(initial=x[0], change=x[1], scale=np.exp(x[2]), exponent=np.exp(x[3]))

@@ -224,7 +224,6 @@ def test_evidence_is_that_of_the_whole_normal_also_with_the_last_run_turned_outl
         expected = multivariate_normal(mean, covariance).logpdf(history.value)
         assert log_probability == pytest.approx(expected, abs=2e-3)
     # With one epoch the first point has no further terms, with three all have.
-    history = History.of(measurements, BELIEF)
     sound = replace(POINTS, outlying=POINTS.outlying * (np.arange(13) < 12)[:, None])
     outlying = replace(sound, outlying=sound.outlying + (np.arange(13) == 12)[:, None])
     sums, terms = linear_model.pointwise(history, BELIEF, sound)

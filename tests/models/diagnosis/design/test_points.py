@@ -10,11 +10,12 @@ from models.clutch import Geometry
 from models.diagnosis import criteria
 from models.diagnosis.baseline.prediction import lag_of
 from models.diagnosis.campaign import Campaign, DynamicRun
-from models.diagnosis.design.design import Design, Points, build_design
+from models.diagnosis.design.design import Design, Points, build_design, thinned
 from models.diagnosis.design.loop_bins import BINS, PHASES, BinnedLoop, binned_loops
 from models.friction.stribeck import GAMMA, StribeckParameters, torque
 from models.loops.lag_laws import attractor_torque
 from models.records.runs import Record
+from tests.models.diagnosis.campaigns import campaign
 
 GEOMETRY = Geometry()
 RPM = 2 * np.pi / 60
@@ -194,3 +195,22 @@ def test_dynamic_tests_that_tell_nothing_are_counted() -> None:
     (sentence,) = said(*tests)
     assert "could not be evaluated and were left out: 1 of 2 (5 bar: The speed does not " in sentence
     assert not said(tests[0])
+
+
+def test_of_a_campaign_that_is_too_large_states_are_used_evenly_from_the_first_to_the_last(monkeypatch) -> None:
+    given = campaign(24, cycles=(0.0, 1.0, 2.0, 3.0, 4.0))
+    size = sum(run.plateaus.torque.size for run in given.stationary) + 5 * 8 * BINS
+    for limit, most, stationary, dynamic in (
+        ("MOST_LOOP_STATES", 5, [0, 1, 2, 3, 4], [0, 1, 2, 3, 4]),
+        ("MOST_LOOP_STATES", 3, [0, 1, 2, 3, 4], [0, 2, 4]),
+        ("MOST_ROWS", size, [0, 1, 2, 3, 4], [0, 1, 2, 3, 4]),
+        ("MOST_ROWS", 0.65 * size, [0, 2, 4], [0, 2, 4]),
+        ("MOST_ROWS", 1, [0, 4], [0, 4]),
+    ):
+        notes: list[str] = []
+        with monkeypatch.context() as patch:
+            patch.setattr(criteria, limit, most)
+            used = thinned(given, notes)
+        assert [run.cycles for run in used.stationary] == stationary
+        assert [run.cycles for run in used.dynamic] == dynamic
+        assert len(notes) == (len(dynamic) < 5)

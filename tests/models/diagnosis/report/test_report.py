@@ -158,7 +158,6 @@ def test_cells_are_means_of_residual_over_noise_and_the_bump_shows_where_it_is(b
     # without an extension after is before
     assert np.array_equal(found.speed_pressure_before, found.speed_pressure_after)
     # the bump shows where it is
-    found = residual_maps(bumped.problem, bumped.baseline.fit, None)
     by_speed = found.speed_pressure_before.mean(axis=0)
     velocity = found.speed * 0.058
     assert abs(velocity[int(by_speed.argmax())] - 3.0) < 1.0
