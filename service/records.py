@@ -43,10 +43,10 @@ from storage.clutches import ClutchRow
 from storage.diagnoses import DiagnosisRow, VerdictRow
 from storage.encoding import Json
 from storage.inspections import InspectionRow, PhotographRow
-from storage.jobs import NewJob
+from storage.jobs import JobRow
 from storage.results import FilterStateRow, FitRow, PredictionRow
 from storage.rigs import RigRow
-from storage.runs import NewRun, RunInOrder
+from storage.runs import RunInOrder, RunRow
 
 if TYPE_CHECKING:
     from models.diagnosis.extension import Extension
@@ -189,7 +189,7 @@ def levels(connection: Connection, clutch_id: str) -> dict[str, list[LevelFit]]:
     return {names[run_key]: [_level_fit(row) for row in rows] for run_key, rows in of_runs.items()}
 
 
-def receipt(row: NewRun) -> dict[str, Any]:
+def receipt(row: RunRow) -> dict[str, Any]:
     """A run's receipt as it is now: as it is stored, and whether the run counts, why not, and the cycles as sent."""
     sent_cycles = row.cycles if row.sent_cycles is None else row.sent_cycles
     return row.receipt | {
@@ -200,7 +200,7 @@ def receipt(row: NewRun) -> dict[str, Any]:
     }
 
 
-def summary(row: NewRun) -> dict[str, Any]:
+def summary(row: RunRow) -> dict[str, Any]:
     """What the audit trail keeps of a run before and after a change."""
     return {"state": row.state, "cycles": whole(row.cycles), "doubts": list(row.doubts)}
 
@@ -291,7 +291,7 @@ def ask_fleet_refresh(connection: Connection, kind: Json | None, *, by: str, at:
     for row in jobs.open_of(connection, jobs.FLEET_REFRESH):
         if row.state == jobs.WAITING and row.of in (fleet, None) and row.arguments.get("learned", False) <= learned:
             return
-    job = NewJob(
+    job = JobRow(
         job_id=secrets.token_hex(8),
         kind=jobs.FLEET_REFRESH,
         clutch_id=None,

@@ -27,8 +27,8 @@ class AlarmRow:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class NewEvent:
-    """An alarm that is about to be raised; `mark` is what it is raised for, `content` what is said of it."""
+class EventRow:
+    """An alarm; `mark` is what it is raised for, `content` what is said of it; the later raised, the greater its key."""
 
     event_id: str
     alarm_id: str
@@ -37,24 +37,18 @@ class NewEvent:
     mark: str
     content: Json
     raised_at: str
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class EventRow(NewEvent):
-    """A stored alarm; the later it was raised, the greater its key."""
-
-    event_key: int
-    acknowledged_at: str | None
-    acknowledged_by: str | None
-    note: str
-    cleared_at: str | None
+    event_key: int = 0
+    acknowledged_at: str | None = None
+    acknowledged_by: str | None = None
+    note: str = ""
+    cleared_at: str | None = None
 
     @property
     def state(self) -> str:
         return CLEARED if self.cleared_at is not None else RAISED if self.acknowledged_at is None else ACKNOWLEDGED
 
 
-_rules, _new_events, _events = Rows(AlarmRow), Rows(NewEvent), Rows(EventRow)
+_rules, _events = Rows(AlarmRow), Rows(EventRow, key="event_key")
 _IN_STATE = {
     RAISED: NOT_CLEARED & alarm_event.c.acknowledged_at.is_(None),
     ACKNOWLEDGED: NOT_CLEARED & alarm_event.c.acknowledged_at.is_not(None),
@@ -94,9 +88,9 @@ def enabled(connection: Connection, clutch_id: str | None = None) -> list[AlarmR
     return _rules.all(connection.execute(query))
 
 
-def insert_event(connection: Connection, row: NewEvent) -> None:
+def insert_event(connection: Connection, row: EventRow) -> None:
     """Raise an alarm. Raises IntegrityError where the rule's alarm of the clutch is not cleared yet."""
-    connection.execute(alarm_event.insert(), _new_events.values(row))
+    connection.execute(alarm_event.insert(), _events.values(row))
 
 
 def event(connection: Connection, event_id: str) -> EventRow | None:

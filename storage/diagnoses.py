@@ -16,8 +16,9 @@ RUNNING, FINISHED, FAILED = "running", "finished", "failed"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class NewDiagnosis:
-    """A diagnosis as it starts, of the runs up to `last_run_key` (0 where there are none).
+class DiagnosisRow:
+    """A diagnosis of the runs up to `last_run_key` (0 where there are none): `report` once it is finished, `problem` where
+    it failed, `extension` where there is one.
 
     `life` is the run_id of the rebuild with which the diagnosed life began, "" for the first life.
     """
@@ -30,26 +31,20 @@ class NewDiagnosis:
     life: str
     as_of_cycles: float | None
     code_version: str
+    diagnosis_key: int = 0
+    status: str = RUNNING
+    finished_at: str | None = None
+    report: Json | None = None
+    extension: Json | None = None
+    problem: str | None = None
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DiagnosisRow(NewDiagnosis):
-    """A stored diagnosis: `report` once it is finished, `problem` where it failed, `extension` where there is one."""
-
-    diagnosis_key: int
-    status: str
-    finished_at: str | None
-    report: Json | None
-    extension: Json | None
-    problem: str | None
+_rows = Rows(DiagnosisRow, key="diagnosis_key")
 
 
-_new, _rows = Rows(NewDiagnosis), Rows(DiagnosisRow)
-
-
-def insert(connection: Connection, row: NewDiagnosis) -> None:
+def insert(connection: Connection, row: DiagnosisRow) -> None:
     """Store a diagnosis that is running. Raises IntegrityError where its clutch is unknown or its id taken."""
-    connection.execute(diagnosis.insert(), _new.values(row, status=RUNNING))
+    connection.execute(diagnosis.insert(), _rows.values(row))
 
 
 def get(connection: Connection, clutch_id: str, diagnosis_id: str) -> DiagnosisRow | None:

@@ -291,18 +291,18 @@ _CODINGS: dict[Any, _Coding] = {
 
 
 class Rows(Generic[Value]):
-    """The rows that hold the fields of a dataclass, and perhaps other columns beside them."""
+    """The rows that hold the fields of a dataclass, and perhaps other columns beside them; the database gives the `key`."""
 
-    def __init__(self, kind: type[Value]) -> None:
-        self._kind = kind
+    def __init__(self, kind: type[Value], *, key: str = "") -> None:
+        self._kind, self._key = kind, key
         hints = get_type_hints(kind)
         self.names = tuple(hints)
         codings = {name: _coding(hint) for name, hint in hints.items()}
         self._coded = {name: coding for name, coding in codings.items() if coding is not None}
 
     def values(self, value: Value, **others: object) -> dict[str, Any]:
-        """The columns of a row, by name; `others` take the place of the value's own, or come beside them."""
-        return self.columns(**{name: getattr(value, name) for name in self.names}) | others
+        """The columns of a row but its key, by name; `others` take the place of the value's own, or come beside them."""
+        return self.columns(**{name: getattr(value, name) for name in self.names if name != self._key}) | others
 
     def columns(self, **fields: object) -> dict[str, Any]:
         """Some fields as their columns have them."""

@@ -16,8 +16,8 @@ from storage.tables import inspection, inspection_photograph, photograph
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class NewInspection:
-    """An inspection that is about to be stored: `cycles` since new, `content` as it was posted and its hash."""
+class InspectionRow:
+    """An inspection: `cycles` since new, `content` as it was posted and its hash; photographs refer to its key."""
 
     clutch_id: str
     inspection_id: str
@@ -27,13 +27,7 @@ class NewInspection:
     received_at: str
     received_by: str
     state: str = ACCEPTED
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class InspectionRow(NewInspection):
-    """A stored inspection; `inspection_key` is what the rows of its photographs refer to."""
-
-    inspection_key: int
+    inspection_key: int = 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,7 +42,7 @@ class PhotographRow:
     received_by: str
 
 
-_new, _rows, _shown = Rows(NewInspection), Rows(InspectionRow), Rows(PhotographRow)
+_rows, _shown = Rows(InspectionRow, key="inspection_key"), Rows(PhotographRow)
 _photographs = (
     select(inspection_photograph.c.inspection_key, *(photograph.c[name] for name in _shown.names[:3]))
     .add_columns(inspection_photograph.c.received_at, inspection_photograph.c.received_by)
@@ -57,10 +51,10 @@ _photographs = (
 )
 
 
-def insert(connection: Connection, row: NewInspection) -> int:
+def insert(connection: Connection, row: InspectionRow) -> int:
     """Store a new inspection and return its key. Raises IntegrityError where the clutch is unknown or has this id."""
     inspection_key: int = next(
-        iter(connection.execute(inspection.insert(), _new.values(row)).inserted_primary_key or ())
+        iter(connection.execute(inspection.insert(), _rows.values(row)).inserted_primary_key or ())
     )
     return inspection_key
 

@@ -22,8 +22,10 @@ DIAGNOSIS, REPLAY, FLEET_REFRESH = "diagnosis", "replay", "fleet_refresh"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class NewJob:
-    """A job as it is asked for: `clutch_id` None where it is of no single clutch, `arguments` what its kind needs."""
+class JobRow:
+    """A job: `clutch_id` None where it is of no single clutch, `arguments` what its kind needs, `attempts` how often it was
+    begun; the later it was asked for, the greater its key.
+    """
 
     job_id: str
     kind: str
@@ -31,20 +33,14 @@ class NewJob:
     asked_at: str
     asked_by: str
     arguments: Json
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class JobRow(NewJob):
-    """A stored job; the later it was asked for, the greater its key. `attempts` counts how often it was begun."""
-
-    job_key: int
-    state: str
-    attempts: int
-    claimed_by: str | None
-    started_at: str | None
-    finished_at: str | None
-    progress: Json | None
-    problem: str | None
+    job_key: int = 0
+    state: str = WAITING
+    attempts: int = 0
+    claimed_by: str | None = None
+    started_at: str | None = None
+    finished_at: str | None = None
+    progress: Json | None = None
+    problem: str | None = None
 
     @property
     def of(self) -> str | None:
@@ -52,7 +48,7 @@ class JobRow(NewJob):
         return self.clutch_id or self.arguments.get("fleet")
 
 
-_new, _rows = Rows(NewJob), Rows(JobRow)
+_rows = Rows(JobRow, key="job_key")
 #: The clutch that was served longest ago comes first, then the job that was asked for first: however many of its jobs wait,
 #: a clutch holds up another's by one. Jobs of no clutch come before all.
 _of_same = job.alias("of_same")
@@ -65,9 +61,9 @@ _next = (
 )
 
 
-def insert(connection: Connection, row: NewJob) -> None:
+def insert(connection: Connection, row: JobRow) -> None:
     """Store a job that waits. Raises IntegrityError where its clutch is unknown or its id taken."""
-    connection.execute(job.insert(), _new.values(row, state=WAITING, attempts=0))
+    connection.execute(job.insert(), _rows.values(row))
 
 
 def get(connection: Connection, job_id: str) -> JobRow | None:

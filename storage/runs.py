@@ -17,10 +17,10 @@ ACCEPTED, HELD, WITHDRAWN = "accepted", "held", "withdrawn"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class NewRun:
-    """A run that is about to be stored. `cycles` since new; `details` holds what only some kinds have; `doubts` are why
-    it is or was held, `sent_cycles` the cycles as they were sent where `cycles` was corrected since, else None;
-    `received_by` is who posted it."""
+class RunRow:
+    """A run. `cycles` since new; `details` holds what only some kinds have; `doubts` are why it is or was held,
+    `sent_cycles` the cycles as they were sent where `cycles` was corrected since, else None; `received_by` is who posted
+    it. Channels and fits refer to its key; the later it arrived, the greater."""
 
     clutch_id: str
     run_id: str
@@ -36,13 +36,7 @@ class NewRun:
     sent_cycles: float | None = None
     doubts: Sequence[Any] = ()
     received_by: str | None = None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RunRow(NewRun):
-    """A stored run; `run_key` is what the rows of its channels and fits refer to, the later it arrived the greater."""
-
-    run_key: int
+    run_key: int = 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -83,7 +77,7 @@ class RunInOrder:
     duty_duration_s: float | None = None
 
 
-_new, _stored, _listed = Rows(NewRun), Rows(RunRow), Rows(ReceiptRow)
+_stored, _listed = Rows(RunRow, key="run_key"), Rows(ReceiptRow)
 _ORDER = (run.c.cycles, run.c.run_id)
 _LIGHT = tuple(field.name for field in fields(RunInOrder))
 _light = select(
@@ -103,9 +97,9 @@ _light = select(
 _held = select(run.c.clutch_id, func.count()).where(HELD_ONLY).group_by(run.c.clutch_id)
 
 
-def insert(connection: Connection, row: NewRun) -> int:
+def insert(connection: Connection, row: RunRow) -> int:
     """Store a new run and return its key. Raises IntegrityError where the clutch is unknown or has this run_id."""
-    run_key: int = next(iter(connection.execute(run.insert(), _new.values(row)).inserted_primary_key or ()))
+    run_key: int = next(iter(connection.execute(run.insert(), _stored.values(row)).inserted_primary_key or ()))
     return run_key
 
 

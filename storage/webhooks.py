@@ -29,31 +29,27 @@ class WebhookRow:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class NewDelivery:
-    """What a receiver is to be sent, of an alarm or (None) as a test: the bytes of the body, as text."""
+class DeliveryRow:
+    """What a receiver is to be sent, of an alarm or (None) as a test: the bytes of the body, as text. `status` and `problem`
+    are of the last attempt, `due` of the next, in seconds since 1970.
+    """
 
     delivery_id: str
     webhook_id: str
     event_id: str | None
     body: str
     created_at: str
+    delivery_key: int = 0
+    state: str = WAITING
+    due: float = 0.0
+    attempts: int = 0
+    last_attempt_at: str | None = None
+    delivered_at: str | None = None
+    status: int | None = None
+    problem: str | None = None
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DeliveryRow(NewDelivery):
-    """A stored delivery: `status` and `problem` are of the last attempt, `due` of the next, in seconds since 1970."""
-
-    delivery_key: int
-    state: str
-    due: float
-    attempts: int
-    last_attempt_at: str | None
-    delivered_at: str | None
-    status: int | None
-    problem: str | None
-
-
-_receivers, _new, _deliveries = Rows(WebhookRow), Rows(NewDelivery), Rows(DeliveryRow)
+_receivers, _deliveries = Rows(WebhookRow), Rows(DeliveryRow, key="delivery_key")
 _of_same = delivery.alias("of_same")
 _oldest_of_each = (
     select(func.min(_of_same.c.delivery_key))
@@ -89,9 +85,9 @@ def remove(connection: Connection, webhook_id: str) -> None:
     connection.execute(delete(webhook).where(webhook.c.webhook_id == webhook_id))
 
 
-def insert_delivery(connection: Connection, row: NewDelivery) -> None:
+def insert_delivery(connection: Connection, row: DeliveryRow) -> None:
     """Put what is to be sent into the outbox, due at once."""
-    connection.execute(delivery.insert(), _new.values(row, state=WAITING, due=0.0, attempts=0))
+    connection.execute(delivery.insert(), _deliveries.values(row))
 
 
 def find_delivery(connection: Connection, delivery_id: str) -> DeliveryRow | None:

@@ -16,24 +16,13 @@ from contextlib import redirect_stdout
 from pathlib import Path
 from typing import Any
 
-from service.alarms.receivers import (
-    ATTEMPT_SECONDS,
-    Attempt,
-    NotAllowedError,
-    allowed,
-    has_controls,
-    post,
-    require_web_address,
-    scheme_of,
-    why_not,
-    wrong_address,
-)
+from service.alarms import receivers
 
 _WEB = ("http", "https")
 #: Addresses of Apprise that stay on this machine, or that say where else to read.
 _LOCAL = {"dbus", "file", "gio", "glib", "gnome", "growl", "kde", "macosx", "qt", "syslog", "windows"}
 #: [s] The process may take in all: it loads a large library first.
-_SECONDS = 3 * ATTEMPT_SECONDS
+_SECONDS = 3 * receivers.ATTEMPT_SECONDS
 #: What a process that sends must not do: start others, or load code that no hook sees.
 _FORBIDDEN = ("subprocess.", "os.exec", "os.fork", "os.posix_spawn", "os.spawn", "os.system", "os.startfile", "ctypes.")
 #: Files that a connection needs, beside those of the installation.
@@ -47,43 +36,45 @@ PYTHON = (sys.executable, "-P")
 
 def require_address(url: str, *, private: bool) -> None:
     """Raise InvalidError where a receiver cannot have this address: it is none, or one that may not be asked."""
-    scheme = scheme_of(url)
+    scheme = receivers.scheme_of(url)
     if scheme not in _WEB:
         _require_apprise(url, scheme)
         return
-    parts = require_web_address(url)
+    parts = receivers.require_web_address(url)
     try:
-        allowed(parts, private=private)
-    except NotAllowedError as error:
-        raise wrong_address(f"url is not allowed: {error}") from error
+        receivers.allowed(parts, private=private)
+    except receivers.NotAllowedError as error:
+        raise receivers.wrong_address(f"url is not allowed: {error}") from error
     except OSError:
         return  # it may be known later; each attempt asks again
 
 
 def _require_apprise(url: str, scheme: str) -> None:
-    if not scheme or scheme in _LOCAL or has_controls(url):
-        raise wrong_address("url must be a web address such as https://example.org/hook, or an address of Apprise")
+    if not scheme or scheme in _LOCAL or receivers.has_controls(url):
+        raise receivers.wrong_address(
+            "url must be a web address such as https://example.org/hook, or an address of Apprise"
+        )
     if importlib.util.find_spec("apprise") is None:
-        raise wrong_address(
+        raise receivers.wrong_address(
             f"url begins with {scheme[:20]}://, which needs the extra `notify`: pip install 'clutchlife[notify]'"
         )
     reply = _exchange({"url": url, "private": False})
     if not reply.get("understood"):
-        raise wrong_address(
+        raise receivers.wrong_address(
             f"url is not an address that Apprise can send to: see Apprise's documentation of {scheme[:20]}://"
         )
 
 
-def send(url: str, body: bytes, *, secret: str, delivery_id: str, private: bool) -> Attempt:
-    if scheme_of(url) in _WEB:
-        return post(url, body, secret=secret, delivery_id=delivery_id, private=private)
+def send(url: str, body: bytes, *, secret: str, delivery_id: str, private: bool) -> receivers.Attempt:
+    if receivers.scheme_of(url) in _WEB:
+        return receivers.post(url, body, secret=secret, delivery_id=delivery_id, private=private)
     content = json.loads(body)
     event = content["event"]
     over = content["type"] == "alarm.cleared"
     title = f"Clutchlife: {event['name'] or event['quantity'].replace('_', ' ')}" + (" is over" if over else "")
     task = {"url": url, "title": title, "body": event["message"], "private": private}
     reply = _exchange(task)
-    return Attempt() if reply.get("sent") else Attempt(problem=reply["problem"])
+    return receivers.Attempt() if reply.get("sent") else receivers.Attempt(problem=reply["problem"])
 
 
 def _exchange(task: dict[str, Any]) -> dict[str, Any]:
@@ -127,11 +118,11 @@ def _require_connectable(address: Any, *, private: bool) -> None:
     if not isinstance(address, tuple):
         raise PermissionError("the sender tried to use a local socket")
     try:
-        reason = why_not(ipaddress.ip_address(str(address[0]).partition("%")[0]), private=private)
+        reason = receivers.why_not(ipaddress.ip_address(str(address[0]).partition("%")[0]), private=private)
     except ValueError:
         reason = "the sender used a name in place of an address"
     if reason is not None:
-        raise NotAllowedError(reason)
+        raise receivers.NotAllowedError(reason)
 
 
 def main() -> None:
@@ -150,7 +141,7 @@ def main() -> None:
             try:
                 answer["sent"] = bool(receiver.notify(body=task["body"], title=task["title"]))
                 answer["problem"] = "the receiver did not accept it"
-            except (NotAllowedError, PermissionError) as error:
+            except (receivers.NotAllowedError, PermissionError) as error:
                 answer["problem"] = f"not sent: {error}"
     sys.stdout.write(json.dumps(answer))
 

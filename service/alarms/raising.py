@@ -20,10 +20,10 @@ from service.schemas.alarm import AlarmIn, EventOut
 from service.schemas.base import schema_fields
 from service.schemas.clutch import ClutchIn
 from storage import alarms, clutches, webhooks
-from storage.alarms import AlarmRow, EventRow, NewEvent
+from storage.alarms import AlarmRow, EventRow
 from storage.clutches import ClutchRow
 from storage.encoding import Json
-from storage.webhooks import NewDelivery, WebhookRow
+from storage.webhooks import DeliveryRow, WebhookRow
 
 SILENT = "silent_hours"
 #: In the content of an alarm that a declared end has cleared: the life that ended.
@@ -78,7 +78,7 @@ def to_receivers(connection: Connection, kind: str, event: EventRow, receivers: 
     for receiver in receivers:
         delivery_id = secrets.token_hex(8)
         body = {"type": kind, "delivery_id": delivery_id, "event": event_out(event)}
-        row = NewDelivery(
+        row = DeliveryRow(
             delivery_id=delivery_id,
             webhook_id=receiver.webhook_id,
             event_id=None if kind == TEST else event.event_id,
@@ -107,11 +107,6 @@ def test_event(row: AlarmRow) -> EventRow:
         mark="",
         content=content,
         raised_at=_now(),
-        event_key=0,
-        acknowledged_at=None,
-        acknowledged_by=None,
-        note="",
-        cleared_at=None,
     )
 
 
@@ -144,7 +139,7 @@ def _raise(row: AlarmRow, rule: AlarmIn, facts: Facts, finding: Finding) -> None
         "message": rules.message(rule, facts, finding),
         "as_of_cycles": facts.summary.get("as_of_cycles"),
     }
-    new = NewEvent(
+    new = EventRow(
         event_id=secrets.token_hex(8),
         alarm_id=row.alarm_id,
         clutch_id=facts.clutch_id,

@@ -14,21 +14,8 @@ from models.clutch import Geometry
 from models.friction.stribeck import PARAMETER_NAMES, StribeckParameters, slope, slope_gradient
 from models.prognosis.first_passage import PassageStatus
 from service.columns import RADIANS_PER_SECOND_PER_RPM, bar
+from service.lives import condition
 from service.lives.assumptions import ALL_PRESSURES
-from service.lives.condition import (
-    DISAGREES,
-    NORMAL,
-    SHOWN,
-    STATE_WORDS,
-    bound_in_words,
-    bound_of,
-    chance_in_words,
-    held_in_words,
-    pace_in_words,
-    silence_in_words,
-    state_of,
-    stated,
-)
 from service.lives.history import STATIONARY
 from service.lives.payloads import ENDED, INSUFFICIENT, OFF_TRACK
 from service.lives.plausibility.doubts import OFF_COURSE
@@ -92,7 +79,7 @@ def message(rule: AlarmIn, facts: Facts, result: Finding) -> str:
     """An alarm as a sentence, with how many runs are held beside it."""
     unit, held_count = _UNITS.get(rule.quantity), facts.summary.get("held", 0)
     limit = "" if rule.limit is None or unit is None else f" (limit: {rule.limit:,.6g}{unit})"
-    waiting = f"; {held_in_words(held_count)}" if held_count and rule.quantity != "held_runs" else ""
+    waiting = f"; {condition.held_in_words(held_count)}" if held_count and rule.quantity != "held_runs" else ""
     return f"{facts.clutch_id}: {result.words}{limit}{waiting}"
 
 
@@ -118,7 +105,11 @@ def _remaining(rule: AlarmIn, facts: Facts) -> float | None:
         return None
     if summary["status"] == PassageStatus.REACHED.value:
         return 0.0
-    cycles = bound_of(summary) if rule.probability == _SAFE else summary["remaining_cycles"][f"{rule.probability:g}"]
+    cycles = (
+        condition.bound_of(summary)
+        if rule.probability == _SAFE
+        else summary["remaining_cycles"][f"{rule.probability:g}"]
+    )
     return None if cycles is None else float(cycles)
 
 
@@ -129,8 +120,8 @@ def _remaining_cycles(rule: AlarmIn, facts: Facts) -> Finding | None:
 
 def _left(rule: AlarmIn, cycles: float) -> str:
     if rule.probability == _SAFE or cycles < 1.0:
-        return bound_in_words(cycles)
-    return f"{chance_in_words(1.0 - rule.probability)} chance of {cycles:,.0f} or more cycles"
+        return condition.bound_in_words(cycles)
+    return f"{condition.chance_in_words(1.0 - rule.probability)} chance of {cycles:,.0f} or more cycles"
 
 
 def _remaining_days(rule: AlarmIn, facts: Facts) -> Finding | None:
@@ -138,7 +129,7 @@ def _remaining_days(rule: AlarmIn, facts: Facts) -> Finding | None:
     if value is None or pace is None:
         return None
     days = value / pace["cycles_per_second"] / _SECONDS_PER_DAY
-    return Finding(value=days, words=f"{_left(rule, value)}: {pace_in_words(pace, value)}")
+    return Finding(value=days, words=f"{_left(rule, value)}: {condition.pace_in_words(pace, value)}")
 
 
 def _health(_rule: AlarmIn, facts: Facts) -> Finding | None:
@@ -162,7 +153,7 @@ def _shudder_margin(rule: AlarmIn, facts: Facts) -> Finding | None:
     if not margins:
         return None
     margin, pressure = min(margins)
-    chance = f"{chance_in_words(1.0 - rule.probability)} chance of {margin:.3g} s/m or more"
+    chance = f"{condition.chance_in_words(1.0 - rule.probability)} chance of {margin:.3g} s/m or more"
     return Finding(
         value=margin, words=f"slope of friction at {rule.speed_rpm:g} rpm and {bar(pressure):g} bar: {chance}"
     )
@@ -177,7 +168,7 @@ def _held_runs(_rule: AlarmIn, facts: Facts) -> Finding | None:
 
 def _off_course(_rule: AlarmIn, facts: Facts) -> Finding | None:
     """Why the newest test is off its course: the warning of the prediction, or the doubt of a held run."""
-    newest = results.prediction_at(facts.connection, facts.clutch_id, SHOWN, ALL_PRESSURES)
+    newest = results.prediction_at(facts.connection, facts.clutch_id, condition.SHOWN, ALL_PRESSURES)
     notices = [] if newest is None else [notice for notice in newest.payload["warnings"] if notice["code"] == OFF_TRACK]
     for row in runs.page(facts.connection, facts.clutch_id, state=runs.HELD):
         notices += [doubt for doubt in row.doubts if doubt["code"] == OFF_COURSE]
@@ -186,7 +177,7 @@ def _off_course(_rule: AlarmIn, facts: Facts) -> Finding | None:
 
 def _verdict(rule: AlarmIn, facts: Facts) -> Finding | None:
     newest = diagnoses.newest(facts.connection, [facts.clutch_id]).get(facts.clutch_id)
-    verdicts = tuple(DISAGREES) if rule.any_of is None else rule.any_of
+    verdicts = tuple(condition.DISAGREES) if rule.any_of is None else rule.any_of
     if newest is None or newest.adopted or newest.verdict not in verdicts:
         return None
     if newest.life != facts.summary.get("life", ""):
@@ -197,13 +188,13 @@ def _verdict(rule: AlarmIn, facts: Facts) -> Finding | None:
 
 
 def _state(rule: AlarmIn, facts: Facts) -> Finding | None:
-    state = state_of(facts.summary, disputed=facts.clutch.is_disputed, silent=facts.clutch.silent)
+    state = condition.state_of(facts.summary, disputed=facts.clutch.is_disputed, silent=facts.clutch.silent)
     name = state["name"]
-    if name not in (rule.any_of or [other for other in STATE_WORDS if other != NORMAL]):
+    if name not in (rule.any_of or [other for other in condition.STATE_WORDS if other != condition.NORMAL]):
         return None
-    known = stated(facts.summary)
+    known = condition.stated(facts.summary)
     clauses = dict.fromkeys([state["why"], *([known["statement"]] if known else [])])
-    return Finding(value=None, words=f"{STATE_WORDS[name].lower()}: {'; '.join(clauses)}", mark=name)
+    return Finding(value=None, words=f"{condition.STATE_WORDS[name].lower()}: {'; '.join(clauses)}", mark=name)
 
 
 def _silent_hours(_rule: AlarmIn, facts: Facts) -> Finding | None:
@@ -212,7 +203,7 @@ def _silent_hours(_rule: AlarmIn, facts: Facts) -> Finding | None:
         return None
     silence = datetime.fromisoformat(facts.now) - datetime.fromisoformat(heard)
     hours = silence.total_seconds() / _SECONDS_PER_HOUR
-    return Finding(value=hours, words=silence_in_words(heard))
+    return Finding(value=hours, words=condition.silence_in_words(heard))
 
 
 _QUANTITIES: dict[str, Callable[[AlarmIn, Facts], Finding | None]] = {

@@ -10,22 +10,7 @@ from typing import Annotated, Any
 import httpx2
 import typer
 
-from service.cli.options import (
-    EX_USAGE,
-    URL,
-    ClutchId,
-    Json,
-    Key,
-    Patience,
-    Reason,
-    Url,
-    asking,
-    fail,
-    listed,
-    out,
-    print_line,
-    say,
-)
+from service.cli import options
 from service.cli.tables import cycles, model_name, show_table
 from service.client.clutchlife import Client, ClutchlifeError
 from service.client.clutchlife.transport import Service
@@ -35,10 +20,10 @@ OK, WARNING, CRITICAL, UNKNOWN = range(4)
 _CODES = {"normal": OK, "failure": CRITICAL}
 
 
-@asking
+@options.asking
 def register(
     service: Service,
-    clutch: ClutchId,
+    clutch: options.ClutchId,
     set_fields: Annotated[
         list[str] | None,
         typer.Option(
@@ -58,10 +43,10 @@ def register(
     for assignment in set_fields or ():
         _assign(fields, {}, assignment)
     service.post("/v1/clutches", fields | {"clutch_id": clutch})
-    print_line(f"{clutch} is registered; send runs with: clutchlife push FILES --clutch {clutch}")
+    options.print_line(f"{clutch} is registered; send runs with: clutchlife push FILES --clutch {clutch}")
 
 
-@asking
+@options.asking
 def list_clutches(
     service: Service,
     state: Annotated[str | None, typer.Option(help="Only clutches in this state, such as maintenance")] = None,
@@ -69,14 +54,14 @@ def list_clutches(
         str | None, typer.Option(help="Only clutches with this text in their name, friction material or fluid")
     ] = None,
     archived: Annotated[bool, typer.Option("--archived", help="Only archived clutches")] = False,
-    as_json: Json = False,
+    as_json: options.Json = False,
 ) -> None:
     """List clutches, worst first, with their state and remaining cycles."""
     chosen = {"state": state, "find": find, "archived": "true" if archived else None}
     items = service.pages("/v1/clutches", **{name: value for name, value in chosen.items() if value is not None})
     columns = ("clutch", "state", "at", "safe for", "50 % chance of", "held")
     nothing = "no clutch is registered; register one with: clutchlife register ID"
-    listed(items, as_json, lambda items: show_table(columns, map(_row, items)), nothing)
+    options.listed(items, as_json, lambda items: show_table(columns, map(_row, items)), nothing)
 
 
 def _row(item: dict[str, Any]) -> list[str]:
@@ -94,27 +79,33 @@ def _row(item: dict[str, Any]) -> list[str]:
     return [item["clutch_id"], ended + state, *numbers, held_count]
 
 
-def status(clutch: ClutchId, as_json: Json = False, url: Url = URL, key: Key = None, patience: Patience = 10.0) -> None:
+def status(
+    clutch: options.ClutchId,
+    as_json: options.Json = False,
+    url: options.Url = options.URL,
+    key: options.Key = None,
+    patience: options.Patience = 10.0,
+) -> None:
     """Print a clutch's state and what to do. The exit code is 0 for normal, 1 for check, maintenance or out of
     specification, 2 for failure, 3 if the state is unknown."""
     try:
         with Client(url, key, patience=patience) as client:
             item = client.clutch(clutch)
     except (ClutchlifeError, httpx2.InvalidURL, ValueError, OSError) as error:
-        say(f"clutchlife: the state is unknown: {error}")
+        options.say(f"clutchlife: the state is unknown: {error}")
         raise typer.Exit(UNKNOWN) from None
     if as_json:
-        out.print_json(json.dumps(item))
+        options.out.print_json(json.dumps(item))
     else:
-        print_line(_headline(item))
-        print_line(item["action"])
+        options.print_line(_headline(item))
+        options.print_line(item["action"])
     raise typer.Exit(_CODES.get(item["state"]["name"], WARNING))
 
 
-@asking
+@options.asking
 def watch(
     service: Service,
-    clutch: ClutchId,
+    clutch: options.ClutchId,
     every: Annotated[float, typer.Option(min=0.1, help="Seconds between two requests")] = 5.0,
     looks: Annotated[
         int | None, typer.Option(min=1, help="End after this number of requests; default: at Ctrl-C")
@@ -127,7 +118,7 @@ def watch(
             time.sleep(every)
         headline = _headline(service.get(f"/v1/clutches/{clutch}"))
         if headline != before:
-            print_line(f"{datetime.now().astimezone():%H:%M:%S}  {headline}")
+            options.print_line(f"{datetime.now().astimezone():%H:%M:%S}  {headline}")
         before, count = headline, count + 1
 
 
@@ -135,11 +126,11 @@ def _headline(item: dict[str, Any]) -> str:
     return f"{item['clutch_id']}: {item['headline']}"
 
 
-@asking
+@options.asking
 def edit(
     service: Service,
-    clutch: ClutchId,
-    reason: Reason,
+    clutch: options.ClutchId,
+    reason: options.Reason,
     set_fields: Annotated[
         list[str],
         typer.Option(
@@ -155,19 +146,19 @@ def edit(
         _assign(fields, record, assignment)
     changed = service.patch(address, fields | {"reason": reason})
     for name in fields:
-        print_line(f"{clutch}: {name} = {json.dumps(changed[name])}")
+        options.print_line(f"{clutch}: {name} = {json.dumps(changed[name])}")
 
 
-@asking
+@options.asking
 def archive(
     service: Service,
-    clutch: ClutchId,
+    clutch: options.ClutchId,
     undo: Annotated[bool, typer.Option("--undo", help="Bring it back")] = False,
-    reason: Reason = "",
+    reason: options.Reason = "",
 ) -> None:
     """Archive a finished clutch: lists omit it, it takes no more runs, and its fleet still learns from it."""
     changed = service.patch(f"/v1/clutches/{clutch}", {"archived": not undo, "reason": reason})
-    print_line(f"{clutch} is {'archived' if changed['archived'] else 'in use'}")
+    options.print_line(f"{clutch} is {'archived' if changed['archived'] else 'in use'}")
 
 
 def _assign(fields: dict[str, Any], record: dict[str, Any], assignment: str) -> None:
@@ -175,7 +166,7 @@ def _assign(fields: dict[str, Any], record: dict[str, Any], assignment: str) -> 
     name, equals, text = assignment.partition("=")
     field, dot, part = name.strip().partition(".")
     if not equals or not field:
-        fail(f"--set takes FIELD=VALUE, got {assignment!r}", EX_USAGE)
+        options.fail(f"--set takes FIELD=VALUE, got {assignment!r}", options.EX_USAGE)
     try:
         value = json.loads(text)
     except ValueError:
@@ -185,14 +176,14 @@ def _assign(fields: dict[str, Any], record: dict[str, Any], assignment: str) -> 
         return
     parent = fields.get(field, record.get(field, {}))
     if not isinstance(parent, dict):
-        fail(f"{field} is a single value: set it as {field}=VALUE", EX_USAGE)
+        options.fail(f"{field} is a single value: set it as {field}=VALUE", options.EX_USAGE)
     fields[field] = parent | {part: value}
 
 
-@asking
+@options.asking
 def model(
     service: Service,
-    clutch: ClutchId,
+    clutch: options.ClutchId,
     adopt: Annotated[
         str | None, typer.Option(metavar="DIAGNOSIS", help="Adopt the extended model of this diagnosis")
     ] = None,
@@ -200,11 +191,11 @@ def model(
 ) -> None:
     """Show a clutch's model, adopt an extended model, or return to the baseline."""
     if adopt is not None and baseline:
-        fail("use --adopt or --baseline, not both", EX_USAGE)
+        options.fail("use --adopt or --baseline, not both", options.EX_USAGE)
     address = f"/v1/clutches/{clutch}/model"
     changes = adopt is not None or baseline
     current = service.put(address, {"diagnosis_id": adopt}) if changes else service.get(address)
-    print_line(f"{clutch} is tracked with: {model_name(current['model'])}")
+    options.print_line(f"{clutch} is tracked with: {model_name(current['model'])}")
     for version in current["versions"]:
         since = f"  version {version['version']}, {version['adopted_at']}: {model_name(version['model'])}"
-        print_line(since + (f" by {version['diagnosis_id']}" if version["diagnosis_id"] else ""))
+        options.print_line(since + (f" by {version['diagnosis_id']}" if version["diagnosis_id"] else ""))

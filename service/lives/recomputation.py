@@ -16,22 +16,10 @@ from models.clutch import Geometry
 from models.degradation.severity import Severity
 from models.diagnosis.campaign import StationaryRun
 from service.errors import Notice
+from service.lives import history
 from service.lives.assumptions import Assumptions, LearnedPrior, kind_of, severity_under
 from service.lives.condition import SHOWN
 from service.lives.diagnosis.campaign import head_of
-from service.lives.history import (
-    ByPressure,
-    Corrected,
-    Event,
-    Life,
-    Series,
-    Shown,
-    life_with,
-    lives_of,
-    order,
-    reference_velocities,
-    stationary_tests_of,
-)
 from service.lives.incoming_run import IncomingRun
 from service.lives.model_correction import RunReader, corrected_cofs, model_in_force
 from service.lives.payloads import OF_HISTORY, OFF_TRACK, fit_items, loop_items, warned_again
@@ -77,11 +65,11 @@ class ClutchState:
 
     record: ClutchIn
     revision: int
-    events: tuple[Event, ...]
+    events: tuple[history.Event, ...]
     adoptions: tuple[Adoption | None, ...]
     priors: Mapping[Severity, LearnedPrior]
     filters: States | None = None
-    held: tuple[Event, ...] = ()
+    held: tuple[history.Event, ...] = ()
     summary: Mapping[str, Any] = field(default_factory=dict)
 
     @property
@@ -98,9 +86,9 @@ class ClutchState:
         return self.record.end_of_life.cof_fraction
 
     @property
-    def lives(self) -> list[Life]:
+    def lives(self) -> list[history.Life]:
         """The history cut at its rebuilds."""
-        return lives_of(self.events)
+        return history.lives_of(self.events)
 
     @property
     def adoption(self) -> Adoption | None:
@@ -120,7 +108,7 @@ class ClutchState:
     def assumptions(self) -> Assumptions:
         return self.assumptions_under(self.extension, self.lives[-1] if self.events else None)
 
-    def assumptions_under(self, extension: Extension | None, life: Life | None) -> Assumptions:
+    def assumptions_under(self, extension: Extension | None, life: history.Life | None) -> Assumptions:
         """What a life would be tracked under, were this extension in force."""
         model = model_in_force(extension, life, self.geometry)
         severity = severity_under(self.record, model.severity_exponent)
@@ -145,9 +133,9 @@ class Results:
     about other runs; and, where it changes what an ended life teaches, the kind of clutches that it `teaches`."""
 
     levels: Levels = field(default_factory=dict)
-    cofs: Mapping[str, ByPressure] = field(default_factory=dict)
+    cofs: Mapping[str, history.ByPressure] = field(default_factory=dict)
     receipts: Mapping[str, Receipt] = field(default_factory=dict)
-    corrected: Mapping[str, Corrected] = field(default_factory=dict)
+    corrected: Mapping[str, history.Corrected] = field(default_factory=dict)
     corrected_again: bool = False
     tracking: Tracking | None = None
     summary: dict[str, Any] | None = None
@@ -186,13 +174,13 @@ def computed_again(
 
 def with_cofs(
     state: ClutchState, levels: Levels, reader: RunReader
-) -> tuple[ClutchState, dict[str, ByPressure], dict[str, Corrected]]:
+) -> tuple[ClutchState, dict[str, history.ByPressure], dict[str, history.Corrected]]:
     """The state with the mean COFs of its events and the new levels that these show, the COFs that the fits give by run_id,
     and those that the model in force corrects; arguments as of `computed_again`."""
     cofs = _cofs_of_tests(state.lives, levels, state.geometry)
     events = tuple(replace(event, cofs=cofs.get(event.run_id, {}), under={}) for event in state.events)
     plain = replace(state, events=events)
-    corrected: dict[str, Corrected] = {}
+    corrected: dict[str, history.Corrected] = {}
     if plain.extension is not None and plain.events:
         life = plain.lives[-1]
         runs = reader.campaign_runs(life.events, origin=life.origin)
@@ -202,18 +190,20 @@ def with_cofs(
     return replace(plain, events=events), cofs, corrected
 
 
-def cofs_among(state: ClutchState, event: Event, levels: Sequence[LevelFit]) -> ByPressure:
+def cofs_among(state: ClutchState, event: history.Event, levels: Sequence[LevelFit]) -> history.ByPressure:
     """A run's mean COFs as they are, or would be, in the history: over the protocol of its life's first stationary test,
     which may be itself."""
-    life = life_with(order([*state.events, event]), event)
+    life = history.life_with(history.order([*state.events, event]), event)
     return _cofs_of_tests([life], {event.run_id: levels}, state.geometry).get(event.run_id, {})
 
 
-def computed_aside(state: ClutchState, event: Event, levels: Levels, reader: RunReader) -> tuple[ByPressure, Receipt]:
+def computed_aside(
+    state: ClutchState, event: history.Event, levels: Levels, reader: RunReader
+) -> tuple[history.ByPressure, Receipt]:
     """The mean COFs of a run that is none of the history, as they would be among it, and what its receipt says of it."""
     fits = levels.get(event.run_id, ())
-    state_with_event = replace(state, events=order([*state.events, event]))
-    evaluated = stationary_tests_of(state_with_event.events)
+    state_with_event = replace(state, events=history.order([*state.events, event]))
+    evaluated = history.stationary_tests_of(state_with_event.events)
     evaluated.pop(event.run_id, None)
     cofs = cofs_among(state, event, fits)
     loops = loops_again(state_with_event, levels, reader, evaluated)
@@ -223,7 +213,7 @@ def computed_aside(state: ClutchState, event: Event, levels: Levels, reader: Run
 def with_set_aside(
     computed: Results,
     state: ClutchState,
-    events: Iterable[Event],
+    events: Iterable[history.Event],
     levels: Levels,
     receipts: Mapping[str, Receipt],
     reader: RunReader,
@@ -240,11 +230,11 @@ def with_set_aside(
     return replace(computed, cofs=cofs, levels=own_levels, receipts=fresh)
 
 
-def _cofs_of_tests(lives: Sequence[Life], levels: Levels, geometry: Geometry) -> dict[str, ByPressure]:
+def _cofs_of_tests(lives: Sequence[history.Life], levels: Levels, geometry: Geometry) -> dict[str, history.ByPressure]:
     """Mean COF of every test that has curves, over the protocol of its life's first test."""
-    cofs: dict[str, ByPressure] = {}
+    cofs: dict[str, history.ByPressure] = {}
     for life in lives:
-        velocities = None if life.speed_range is None else reference_velocities(life.speed_range, geometry)
+        velocities = None if life.speed_range is None else history.reference_velocities(life.speed_range, geometry)
         for event in life.events:
             if levels.get(event.run_id):
                 fits = levels[event.run_id]
@@ -253,8 +243,8 @@ def _cofs_of_tests(lives: Sequence[Life], levels: Levels, geometry: Geometry) ->
 
 
 def corrected_newest(
-    state: ClutchState, newest: Event, test: StationaryRun | None, reader: RunReader
-) -> Corrected | None:
+    state: ClutchState, newest: history.Event, test: StationaryRun | None, reader: RunReader
+) -> history.Corrected | None:
     """The mean COFs of the test that comes last, freed of artefacts of the model in force; None where nothing changes."""
     if state.extension is None or newest.speed_range is None or test is None:
         return None
@@ -263,7 +253,7 @@ def corrected_newest(
     return corrected_cofs(state.extension, state.record, life, runs, [test]).get(newest.run_id)
 
 
-def track(state: ClutchState, *, newest: Event | None = None) -> Tracking:
+def track(state: ClutchState, *, newest: history.Event | None = None) -> Tracking:
     """Track what the history asks for: one step where `newest` comes last and the filters' states serve, else all of it."""
     if not state.events:
         return Tracking()
@@ -271,7 +261,7 @@ def track(state: ClutchState, *, newest: Event | None = None) -> Tracking:
     last = lives[-1].pooled(assumptions)
     carried = None if newest is None else _carried(state, lives[-1], last, newest)
     first = 0 if carried is None else len(lives[-1].events) - 1
-    walks: list[tuple[Life, Series, States, int]] = [(lives[-1], last, carried or {}, first)]
+    walks: list[tuple[history.Life, history.Series, States, int]] = [(lives[-1], last, carried or {}, first)]
     if carried is None:
         walks[:0] = [(life, life.pooled(assumptions), {}, 0) for life in lives[:-1]]
     predictions: dict[tuple[float, str], Prediction] = {}
@@ -290,7 +280,7 @@ def track(state: ClutchState, *, newest: Event | None = None) -> Tracking:
     return Tracking(predictions=tuple(predictions.values()), filters=filters, warnings=warnings, again=carried is None)
 
 
-def _carried(state: ClutchState, life: Life, whole: Series, newest: Event) -> States | None:
+def _carried(state: ClutchState, life: history.Life, whole: history.Series, newest: history.Event) -> States | None:
     """The stored states from before `newest`, or None where one step on from them would not give the same answer."""
     last = life.events[-1]
     is_test = newest.speed_range is not None
@@ -311,7 +301,7 @@ def loops_again(
     """run_id -> loops of the dynamic tests that have another stationary test than that which they were `evaluated` against,
     by run_id; of those that are not there, too."""
     loops = {}
-    for run_id, test in stationary_tests_of(state.events).items():
+    for run_id, test in history.stationary_tests_of(state.events).items():
         if run_id not in evaluated or evaluated[run_id] != test:
             fits = [] if test is None else levels.get(test, [])
             loops[run_id] = loop_items(
@@ -328,7 +318,7 @@ class Arrival:
     run: IncomingRun
     sampled: bool
     analysis: Analysis
-    shown: Shown | None
+    shown: history.Shown | None
     odd: tuple[Notice, ...]
     received_at: str
 
@@ -339,7 +329,7 @@ class Arrival:
         )
 
 
-def test_of(arrival: Arrival, life: Life) -> StationaryRun | None:
+def test_of(arrival: Arrival, life: history.Life) -> StationaryRun | None:
     """The run as a stationary test of a life, by the plateaus that were cut already."""
     plateaus, times = arrival.analysis.plateaus, arrival.analysis.times
     if plateaus is None:

@@ -27,25 +27,10 @@ from models.tracking.posterior import Posterior, Tracker, mixture
 from models.tracking.prior import Prior
 from service.columns import PASCALS_PER_BAR, bar, whole
 from service.errors import NotFoundError, Notice
+from service.lives import payloads
 from service.lives.assumptions import ALL_PRESSURES, WEAK, Assumptions
 from service.lives.criteria import FEWEST_PARTICLES, PREDICTION_DRAWS
 from service.lives.history import Event, Life, Series, lives_of, nearest_pressure
-from service.lives.payloads import (
-    SAFE,
-    by_quantile,
-    criterion_item,
-    ended,
-    insufficient,
-    left_out,
-    missed,
-    new_extrapolated,
-    new_level,
-    not_eq_6,
-    notice_items,
-    off_track,
-    safe_bound,
-    share_of_way,
-)
 
 FilterState = ParticleState | UkfState | GridState
 
@@ -122,7 +107,7 @@ def follow(
         predictions = []
         for method in CARRIED:
             payload = predict(method, series, assumptions, states.get(method), cycles, fraction, tests=tests)
-            predictions.append(Prediction(cycles=cycles, method=method, payload=ended(payload, so_far.end)))
+            predictions.append(Prediction(cycles=cycles, method=method, payload=payloads.ended(payload, so_far.end)))
         yield states, predictions
 
 
@@ -247,7 +232,7 @@ def predict(
 
     With too few of them only the last and the safe bound are stated.
     """
-    answer = insufficient(assumptions, cycles, series.pressure, fraction)
+    answer = payloads.insufficient(assumptions, cycles, series.pressure, fraction)
     if tracked is None:
         return answer
     runs, scale = tracked.runs, series.scale
@@ -268,40 +253,46 @@ def predict(
     measured_at, (value, sd) = series.as_measured(assumptions, runs - 1)
     measured = {"mean_cof": value, "mean_cof_sd": sd, "measured_at_cycles": whole(round(measured_at, 3))}
     notices = [
-        *left_out(tests, runs),
-        *new_level([at for at in series.new_levels if at <= cycles]),
+        *payloads.left_out(tests, runs),
+        *payloads.new_level([at for at in series.new_levels if at <= cycles]),
         *_off_track(sample, series, assumptions, runs),
     ]
     answer |= {
         "runs_used": runs,
         "current": answer["current"] | measured,
         "horizon_cycles": whole(horizon_cycles),
-        "at_least": safe_bound(ends[SAFE], cycles, scale.origin),
-        "warnings": notice_items(notices),
+        "at_least": payloads.safe_bound(ends[payloads.SAFE], cycles, scale.origin),
+        "warnings": payloads.notice_items(notices),
     }
     if len({measurement.progress for measurement in series.measurements[:runs]}) < FEWEST_TESTS:
         return answer  # what else the prior makes of the tests is no finding
     courses, back_cast = course_shares(sample), tracked.back_cast
-    notices += [*not_eq_6(courses), *new_extrapolated(series, assumptions, end.late, fraction), *missed(back_cast)]
+    notices += [
+        *payloads.not_eq_6(courses),
+        *payloads.new_extrapolated(series, assumptions, end.late, fraction),
+        *payloads.missed(back_cast),
+    ]
     course, *alternatives = (
         {"name": share.name.value, "probability": share.probability, "order": share.order} for share in courses
     )
     mean, deviation = passage.current
     left = mean / passage.initial if passage.initial > 0 else None
-    health = None if left is None else share_of_way(left, 1.0, fraction)
+    health = None if left is None else payloads.share_of_way(left, 1.0, fraction)
     now = {"mean_cof": mean, "mean_cof_sd": deviation, "fraction_of_initial": left, "health": health}
     return answer | {
         "status": passage.status.value,
-        "criterion": criterion_item(fraction, series.pressure, passage.initial, passage.threshold),
+        "criterion": payloads.criterion_item(fraction, series.pressure, passage.initial, passage.threshold),
         "current": answer["current"] | now,
-        "remaining_cycles": by_quantile({q: None if at is None else max(0.0, at - cycles) for q, at in ends.items()}),
-        "end_of_life_cycles": by_quantile(ends),
+        "remaining_cycles": payloads.by_quantile(
+            {q: None if at is None else max(0.0, at - cycles) for q, at in ends.items()}
+        ),
+        "end_of_life_cycles": payloads.by_quantile(ends),
         "probability_of_reaching": passage.probability_of_reaching,
         "back_cast": {"held": back_cast.held, "of": back_cast.misses.size, "widening": back_cast.widening},
         "ended_lives": end.lives,
         "sample": {"effective_draws": sample.effective_draws, "status": sample.status.value},
         "course": {**course, "alternatives": alternatives},
-        "warnings": notice_items(notices),
+        "warnings": payloads.notice_items(notices),
     }
 
 
@@ -310,7 +301,7 @@ def _off_track(sample: Posterior, series: Series, assumptions: Assumptions, runs
     first: list[Notice] = []
     for draw, (_, measurements) in enumerate(series.weighted):
         prior = assumptions.priors(series.quantity, measurements[0], series.scale)[WEAK]
-        notices = off_track(sample.of_branch(draw), measurements[:runs], prior)
+        notices = payloads.off_track(sample.of_branch(draw), measurements[:runs], prior)
         if not notices:
             return []
         first = first or notices
@@ -374,14 +365,14 @@ def predict_at(
     level = ALL_PRESSURES if pressure_bar is None else _level(lives[-1] if lives else None, pressure_bar)
     happened = [event for event in events if at_cycles is None or event.cycles <= at_cycles]
     if not happened:
-        return insufficient(assumptions, None, level, fraction)
+        return payloads.insufficient(assumptions, None, level, fraction)
     life = lives_of(happened)[-1]
     cycles = happened[-1].cycles
     series = life.pooled(assumptions) if pressure_bar is None else life.at(assumptions, level)
     if not series.measurements:
-        return ended(insufficient(assumptions, cycles, level, fraction), life.end)
+        return payloads.ended(payloads.insufficient(assumptions, cycles, level, fraction), life.end)
     tracked = advance(method, series, assumptions, carried, len(series.measurements), back_cast=back_cast)
-    return ended(predict(method, series, assumptions, tracked, cycles, fraction, tests=life.tests), life.end)
+    return payloads.ended(predict(method, series, assumptions, tracked, cycles, fraction, tests=life.tests), life.end)
 
 
 def _level(life: Life | None, pressure_bar: float) -> float:

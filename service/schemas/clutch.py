@@ -7,20 +7,7 @@ from pydantic import BeforeValidator, Field, model_validator
 from models.clutch import Geometry
 from models.degradation.severity import Severity, SeverityBasis
 from service.columns import whole
-from service.schemas import base
-from service.schemas.life import (
-    AtLeast,
-    AtLeastAt,
-    CountedFrom,
-    Criterion,
-    CriterionIn,
-    Current,
-    DeclaredEnd,
-    Held,
-    ModelName,
-    Quantiles,
-    Statement,
-)
+from service.schemas import base, life
 
 #: 2.0 is the whole number 2.
 WholeNumber = Annotated[
@@ -96,7 +83,7 @@ class EndOfLifeIn(base.Schema):
         default=0.5, description="The life ends when mean COF has fallen to this fraction of its initial value"
     )
 
-    criteria: Annotated[tuple[CriterionIn, ...], Field(max_length=base.MAX_CRITERIA)] = Field(
+    criteria: Annotated[tuple[life.CriterionIn, ...], Field(max_length=base.MAX_CRITERIA)] = Field(
         default=(),
         description="Limits that end the life, in place of `cof_fraction`: the one that is reached first counts",
     )
@@ -173,19 +160,19 @@ class ClutchSummary(base.Answer):
     status: str = Field(description="The status of `/remaining-useful-life`")
     as_of_cycles: float | None = Field(description="Duty cycles since new of the latest run")
     runs_used: int = Field(description="Number of stationary tests that the prediction uses")
-    current: Current = Field(description="The clutch's present state")
-    criterion: Criterion = Field(description="The end-of-life criterion that will most probably be reached first")
-    remaining_cycles: Quantiles = Field(description="Quantiles of the remaining duty cycles, by probability")
-    at_least: AtLeast
-    at_least_at: AtLeastAt
-    counted_from: CountedFrom
-    held_runs: Held
-    statement: Statement
+    current: life.Current = Field(description="The clutch's present state")
+    criterion: life.Criterion = Field(description="The end-of-life criterion that will most probably be reached first")
+    remaining_cycles: life.Quantiles = Field(description="Quantiles of the remaining duty cycles, by probability")
+    at_least: life.AtLeast
+    at_least_at: life.AtLeastAt
+    counted_from: life.CountedFrom
+    held_runs: life.Held
+    statement: life.Statement
     probability_of_reaching: float | None = Field(
         description="Probability that the end of life is reached by the horizon"
     )
-    model: ModelName = Field(description="The model that the clutch is tracked under")
-    ended: DeclaredEnd | None = Field(description="The declared end of the present life; null while it goes on")
+    model: life.ModelName = Field(description="The model that the clutch is tracked under")
+    ended: life.DeclaredEnd | None = Field(description="The declared end of the present life; null while it goes on")
 
 
 class LastRun(base.Answer):

@@ -11,7 +11,7 @@ from service import records
 from service.errors import BusyError, found
 from storage import diagnoses, jobs
 from storage.engine.database import Database
-from storage.jobs import JobRow, NewJob
+from storage.jobs import JobRow
 
 
 def ask(
@@ -32,7 +32,7 @@ def ask(
         if len(already) >= most:
             raise BusyError(f"{len(already)} jobs of the kind {kind} already wait: try again later")
         job_id = secrets.token_hex(8)
-        new = NewJob(
+        new = JobRow(
             job_id=job_id,
             kind=kind,
             clutch_id=clutch_id,

@@ -16,21 +16,8 @@ from models.clutch import Geometry
 from models.loops.loops import Loop
 from service import records, stored_runs
 from service.errors import ArchivedError, BusyError, ConflictError, Notice, TooLargeError
+from service.lives import history
 from service.lives.engagements import stored_engagement
-from service.lives.history import (
-    DYNAMIC,
-    STATIONARY,
-    ByPressure,
-    Corrected,
-    Event,
-    duty_block,
-    life_with,
-    maintenance_fields,
-    moment_of,
-    order,
-    require_within_ends,
-    stationary_tests_of,
-)
 from service.lives.incoming_run import IncomingRun
 from service.lives.outlook import Evidence, held_summary, needs_evidence, summarised
 from service.lives.payloads import history_warnings, notice_items, receipt, warned_again
@@ -55,7 +42,7 @@ from service.settings import CODE_VERSION
 from storage import changes, channels, results, runs
 from storage.channels import PackedFile
 from storage.engine.database import Database
-from storage.runs import NewRun, RunRow
+from storage.runs import RunRow
 
 #: Bytes of a packed file that are kept. Derived: a value of SQLite's has 1e9 at most.
 MAX_FILE_BYTES = 900_000_000
@@ -68,7 +55,7 @@ class _Outcome:
 
     revision: int
     receipt: dict[str, Any]
-    cofs: ByPressure
+    cofs: history.ByPressure
     results: Results
     doubts: tuple[Notice, ...] = ()
 
@@ -129,7 +116,8 @@ def ingest(
             columns = encoding.result()
     else:  # a thread takes longer to begin than a few plateaus to deflate
         analysis, columns = analyse(run, geometry, torque_filter), channels.encoded(run.channels, file)
-    if sampled and run.kind == STATIONARY:  # loops are yet to be fitted; another long record need not be held twice
+    # Loops are yet to be fitted; another long record need not be held twice.
+    if sampled and run.kind == history.STATIONARY:
         run = replace(run, channels={})
     if columns.is_long:
         columns = stored_runs.placed(database, columns)
@@ -179,8 +167,8 @@ def _computed(database: Database, before: ClutchState, arrival: Arrival, read_wi
         raise BusyError("the clutch's geometry or filter was edited while the run was read: send the run again")
     event = _event_of(arrival)
     event = replace(event, cofs=cofs_among(before, event, arrival.analysis.fits))
-    state = replace(before, events=order([*before.events, event]))
-    require_within_ends(state.events)
+    state = replace(before, events=history.order([*before.events, event]))
+    history.require_within_ends(state.events)
     levels = _levels(database, state, event, arrival)
     answer, evaluated = _receipt(before, state, event, arrival, levels)
     judged = Judged()
@@ -221,21 +209,21 @@ def _computed(database: Database, before: ClutchState, arrival: Arrival, read_wi
             levels={run_id: fits for run_id, fits in computed.levels.items() if run_id != event.run_id},
             summary=summarised(final, computed.tracking or Tracking(), evidence),
             judged=judged,
-            teaches=state.kind if not doubts and life_with(state.events, event).end is not None else None,
+            teaches=state.kind if not doubts and history.life_with(state.events, event).end is not None else None,
         ),
         doubts=doubts,
     )
 
 
 def _receipt(
-    before: ClutchState, state: ClutchState, event: Event, arrival: Arrival, levels: Levels
+    before: ClutchState, state: ClutchState, event: history.Event, arrival: Arrival, levels: Levels
 ) -> tuple[dict[str, Any], dict[str, str | None]]:
     """The run's receipt, and by which stationary test the loops of each dynamic one were evaluated: of those before, and of
     the run itself."""
-    evaluated = stationary_tests_of(before.events)
+    evaluated = history.stationary_tests_of(before.events)
     loops: Sequence[Loop] = ()
-    if event.kind == DYNAMIC:
-        test = evaluated[event.run_id] = stationary_tests_of(state.events)[event.run_id]
+    if event.kind == history.DYNAMIC:
+        test = evaluated[event.run_id] = history.stationary_tests_of(state.events)[event.run_id]
         curves = [] if test is None else levels.get(test, [])
         loops = loops_of(arrival.run.channels, state.geometry, state.record.torque_filter, curves)
     answer = receipt(
@@ -252,24 +240,24 @@ def _receipt(
 def _one_step(
     database: Database,
     state: ClutchState,
-    event: Event,
+    event: history.Event,
     levels: Levels,
     answer: dict[str, Any],
     arrival: Arrival,
     evaluated: Mapping[str, str | None],
 ) -> tuple[ClutchState, Results]:
     """What changes with a run that leaves what was measured before as it is: the filters carried on, if they may be."""
-    corrected: dict[str, Corrected] = {}
+    corrected: dict[str, history.Corrected] = {}
     if state.extension is not None and event is state.events[-1]:
         runs_before = stored_runs.run_reader(database, state.clutch_id)
-        cofs = corrected_newest(state, event, test_of(arrival, life_with(state.events, event)), runs_before)
+        cofs = corrected_newest(state, event, test_of(arrival, history.life_with(state.events, event)), runs_before)
         if cofs is not None:
             event = event.corrected(cofs)
             corrected, state = {event.run_id: cofs}, replace(state, events=(*state.events[:-1], event))
     tracking = track(state, newest=event)
     noticed = history_warnings(state.lives, tracking.warnings, run_id=event.run_id)[event.run_id]
     changed = {event.run_id: answer | {"warnings": answer["warnings"] + noticed}}
-    outdated = evaluated != stationary_tests_of(state.events)
+    outdated = evaluated != history.stationary_tests_of(state.events)
     if tracking.again or outdated:
         with database.reading() as connection:
             receipts = records.receipts(connection, state.clutch_id) | changed
@@ -300,9 +288,9 @@ def _own_levels(arrival: Arrival) -> dict[str, Sequence[LevelFit]]:
     return {arrival.run.run_id: arrival.analysis.fits} if arrival.analysis.fits else {}
 
 
-def _levels(database: Database, state: ClutchState, event: Event, arrival: Arrival) -> Levels:
+def _levels(database: Database, state: ClutchState, event: history.Event, arrival: Arrival) -> Levels:
     """The levels of all tests where they are needed, else those of the run alone."""
-    if event.kind != DYNAMIC and event is state.events[-1] and not event.rebuild and state.adoption is None:
+    if event.kind != history.DYNAMIC and event is state.events[-1] and not event.rebuild and state.adoption is None:
         return _own_levels(arrival)
     with database.reading() as connection:
         return records.levels(connection, state.clutch_id) | _own_levels(arrival)
@@ -313,7 +301,7 @@ def _store(
 ) -> dict[str, Any]:
     """The run, its channels and fits, and what it changes; the revision moves on. Returns the receipt."""
     run = arrival.run
-    row = NewRun(
+    row = RunRow(
         clutch_id=clutch_id,
         run_id=run.run_id,
         kind=run.kind,
@@ -340,25 +328,25 @@ def _store(
     return records.receipt(row)
 
 
-def _event_of(arrival: Arrival) -> Event:
+def _event_of(arrival: Arrival) -> history.Event:
     run = arrival.run
     duty = run.details.get("duty") or {}
     names = ("cycles", "energy_per_cycle_kj", "initial_speed_rpm", "engagement_duration_s")
-    return Event(
+    return history.Event(
         run_id=run.run_id,
         kind=run.kind,
         cycles=run.cycles,
-        moment=moment_of(run.started_at, arrival.received_at),
+        moment=history.moment_of(run.started_at, arrival.received_at),
         speed_range=arrival.analysis.speed_range,
         oil_temperature=arrival.analysis.oil_temperature,
-        **maintenance_fields(run.details.get("event"), run.details.get("reason")),
-        duty=duty_block(run.cycles, *(duty.get(name) for name in names)),
+        **history.maintenance_fields(run.details.get("event"), run.details.get("reason")),
+        duty=history.duty_block(run.cycles, *(duty.get(name) for name in names)),
         dated=run.started_at is not None,
         shown=arrival.shown,
     )
 
 
-def _changes_the_past(before: ClutchState, ordered: Sequence[Event], event: Event) -> bool:
+def _changes_the_past(before: ClutchState, ordered: Sequence[history.Event], event: history.Event) -> bool:
     """Whether predictions of earlier or later tests no longer hold.
 
     A late test or rebuild may make another test the reference, and with it the protocol of all means; under an adopted

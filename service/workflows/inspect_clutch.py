@@ -15,7 +15,7 @@ from service.schemas.base import MAX_PHOTOGRAPHS
 from service.schemas.inspection import InspectionIn, MediaType
 from storage import changes, clutches, inspections
 from storage.engine.database import Database
-from storage.inspections import InspectionRow, NewInspection, PhotographRow
+from storage.inspections import InspectionRow, PhotographRow
 from storage.runs import WITHDRAWN
 
 #: The first characters of the content's hash that name an inspection. Chosen: as a diagnosis' name.
@@ -31,7 +31,7 @@ def inspect(database: Database, clutch_id: str, sent: InspectionIn, *, by: str, 
     content_sha256 = inspection_hash(content)
     with database.writing(of=clutch_id) as connection:
         records.clutch(connection, clutch_id)
-        row = NewInspection(
+        row = InspectionRow(
             clutch_id=clutch_id,
             inspection_id=content_sha256[:_ID_CHARACTERS],
             cycles=sent.cycles,

@@ -9,9 +9,9 @@ from service.errors import BusyError
 from service.lives.history import lives_of
 from service.settings import CODE_VERSION
 from storage import changes, diagnoses, jobs
-from storage.diagnoses import NewDiagnosis
+from storage.diagnoses import DiagnosisRow
 from storage.engine.database import Database
-from storage.jobs import DIAGNOSIS, JobRow, NewJob
+from storage.jobs import DIAGNOSIS, JobRow
 
 
 def ask(
@@ -48,7 +48,7 @@ def ask(
         if waiting >= most:
             raise BusyError(f"{waiting} diagnoses already wait: try again later")
         lives = lives_of(records.events(connection, clutch_id))
-        row = NewDiagnosis(
+        row = DiagnosisRow(
             clutch_id=clutch_id,
             diagnosis_id=secrets.token_hex(8),
             created_at=created_at,
@@ -65,7 +65,7 @@ def ask(
             "isolability": isolability,
             "request": request,
         }
-        job_row = NewJob(
+        job_row = JobRow(
             job_id=row.diagnosis_id,
             kind=DIAGNOSIS,
             clutch_id=clutch_id,

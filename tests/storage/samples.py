@@ -19,11 +19,11 @@ from sqlalchemy import Connection, text
 
 from storage import channels, clutches, runs
 from storage.clutches import ClutchRow
-from storage.diagnoses import NewDiagnosis
+from storage.diagnoses import DiagnosisRow
 from storage.engine.opening import open_database
 from storage.migrations import upgrade as migrations
 from storage.results import FitRow
-from storage.runs import NewRun
+from storage.runs import RunRow
 
 CLUTCH = "bench3-017"
 
@@ -40,8 +40,8 @@ def clutch_row(clutch_id: str = CLUTCH, *, rank: float = 0.0) -> ClutchRow:
     )
 
 
-def new_run(number: int = 0, *, clutch_id: str = CLUTCH, cycles: float | None = None) -> NewRun:
-    return NewRun(
+def new_run(number: int = 0, *, clutch_id: str = CLUTCH, cycles: float | None = None) -> RunRow:
+    return RunRow(
         clutch_id=clutch_id,
         run_id=f"run-{number:04d}",
         kind="stationary_stribeck",
@@ -55,8 +55,8 @@ def new_run(number: int = 0, *, clutch_id: str = CLUTCH, cycles: float | None = 
     )
 
 
-def new_diagnosis(number: int, clutch_id: str = CLUTCH, *, last_run_key: int = 1) -> NewDiagnosis:
-    return NewDiagnosis(
+def new_diagnosis(number: int, clutch_id: str = CLUTCH, *, last_run_key: int = 1) -> DiagnosisRow:
+    return DiagnosisRow(
         clutch_id=clutch_id,
         diagnosis_id=f"d{number}",
         created_at="2026-11-02T10:00:00+00:00",

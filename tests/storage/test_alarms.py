@@ -7,14 +7,14 @@ from sqlalchemy import Connection
 from sqlalchemy.exc import IntegrityError
 
 from storage import alarms, clutches, webhooks
-from storage.alarms import AlarmRow, NewEvent
+from storage.alarms import AlarmRow, EventRow
 from storage.engine.database import Database
-from storage.webhooks import NewDelivery, WebhookRow
+from storage.webhooks import DeliveryRow, WebhookRow
 from tests.storage.samples import CLUTCH
 
 AT = "2026-11-02T10:00:00+00:00"
 RULE = AlarmRow(alarm_id="a", clutch_id=CLUTCH, enabled=True, content={"quantity": "state"}, saved_at=AT, saved_by="me")
-EVENT = NewEvent(event_id="e1", alarm_id="a", clutch_id=CLUTCH, quantity="state", mark="", content={}, raised_at=AT)
+EVENT = EventRow(event_id="e1", alarm_id="a", clutch_id=CLUTCH, quantity="state", mark="", content={}, raised_at=AT)
 RECEIVER = WebhookRow(
     webhook_id="w", address="https://example.org", secret="", content={}, created_at=AT, created_by=""
 )
@@ -50,7 +50,7 @@ def test_a_delivery_is_somebodys_for_a_while_then_anybodys(database: Database) -
         for name in ("w", "other"):
             webhooks.insert(connection, replace(RECEIVER, webhook_id=name))
         for name, receiver in (("d1", "w"), ("d2", "w"), ("d3", "other")):
-            new = NewDelivery(delivery_id=name, webhook_id=receiver, event_id="e1", body="{}", created_at=AT)
+            new = DeliveryRow(delivery_id=name, webhook_id=receiver, event_id="e1", body="{}", created_at=AT)
             webhooks.insert_delivery(connection, new)
     with database.writing() as connection:
         claimed = webhooks.claim(connection, lease=60.0, most=8)

@@ -10,14 +10,14 @@ from sqlalchemy import Connection
 from storage import clutches, jobs
 from storage.engine.database import Database
 from storage.engine.opening import open_database
-from storage.jobs import CANCELLED, FAILED, FINISHED, RUNNING, WAITING, JobRow, NewJob
+from storage.jobs import CANCELLED, FAILED, FINISHED, RUNNING, WAITING, JobRow
 from tests.storage.samples import CLUTCH, clutch_row
 
 AT = "2026-11-02T10:00:0{}+00:00"
 
 
-def new_job(number: int, clutch_id: str | None = CLUTCH) -> NewJob:
-    return NewJob(
+def new_job(number: int, clutch_id: str | None = CLUTCH) -> JobRow:
+    return JobRow(
         job_id=f"j{number}",
         kind="diagnosis",
         clutch_id=clutch_id,

@@ -8,22 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from service.cli.options import (
-    EX_DATAERR,
-    EX_TEMPFAIL,
-    EX_USAGE,
-    URL,
-    ChannelMap,
-    Decimal,
-    Key,
-    Missing,
-    Patience,
-    Url,
-    errors_in_a_line,
-    fail,
-    print_line,
-    say,
-)
+from service.cli import options
 from service.cli.sending.delivery import transmit
 from service.cli.sending.spool import (
     INSPECTIONS,
@@ -51,18 +36,18 @@ SpoolFolder = Annotated[Path, typer.Option("--spool", help="Where runs wait unti
 def push(
     paths: Annotated[list[Path], typer.Argument(metavar="PATH...", help="Run files, or folders of them")],
     clutch: Annotated[str, typer.Option(help="The clutch that was tested")],
-    url: Url = URL,
-    key: Key = None,
+    url: options.Url = options.URL,
+    key: options.Key = None,
     spool: SpoolFolder = SPOOL,
-    patience: Patience = 60.0,
+    patience: options.Patience = 60.0,
     kind: Annotated[str | None, typer.Option(help="For files that are not JSON: the kind of run")] = None,
     cycles: Annotated[float | None, typer.Option(help="For files that are not JSON: duty cycles since new")] = None,
     rig: Annotated[
         str | None, typer.Option(help="For files that are not JSON: the rig profile to read them with")
     ] = None,
-    channel_map: ChannelMap = None,
-    decimal: Decimal = None,
-    missing: Missing = None,
+    channel_map: options.ChannelMap = None,
+    decimal: options.Decimal = None,
+    missing: options.Missing = None,
 ) -> None:
     """Send run files to the service.
 
@@ -74,17 +59,17 @@ def push(
     version that waits.
     """
     reading = {"map": channel_map, "decimal": decimal, "missing": missing}
-    with errors_in_a_line():
+    with options.errors_in_a_line():
         try:
             files = manifest.find(paths)
         except FileNotFoundError as error:
-            fail(str(error), EX_DATAERR)
+            options.fail(str(error), options.EX_DATAERR)
         unlisted = manifest.unlisted(paths)
         if rig is not None:
             files += [manifest.RunFile(path=record) for record in unlisted]
         elif unlisted:
             names = ", ".join(str(record) for record in unlisted)
-            say(f"not sent, because kind and cycles are not known: {names}. {_REMEDY}")
+            options.say(f"not sent, because kind and cycles are not known: {names}. {_REMEDY}")
         record = _record(paths, clutch)
         if record is None:
             _require_known(url, key, clutch)
@@ -96,7 +81,7 @@ def push(
             added, replaced = waiting.add(requests, resource)
             digests |= added
             for entry in replaced:
-                say(_replacement(waiting, entry))
+                options.say(_replacement(waiting, entry))
         _warn_of_others(waiting, digests)
         transmit([waiting], url, key, patience, lambda service, _: _register(service, clutch, record))
 
@@ -111,7 +96,7 @@ def _request(
     if file.parameters is not None:
         stated = file.parameters
     elif rig is None and (kind is None or cycles is None):  # a rig's profile finds them
-        fail(f"the kind and the cycles of {file.path} are not known. {_REMEDY}", EX_USAGE)
+        options.fail(f"the kind and the cycles of {file.path} are not known. {_REMEDY}", options.EX_USAGE)
     else:
         stated = {"kind": kind, "cycles": None if cycles is None else repr(cycles), "filename": file.path.name}
     parameters = {**reading, "rig": rig, **stated}
@@ -131,7 +116,7 @@ def _warn_of_others(spool: Spool, digests: set[str]) -> None:
     if other_entries:
         oldest = min(entry.since for entry in other_entries)
         count = "1 other run waits" if len(other_entries) == 1 else f"{len(other_entries)} other runs wait"
-        say(f"{count} for {spool.clutch_id} since {oldest} and will be sent too: see clutchlife spool list")
+        options.say(f"{count} for {spool.clutch_id} since {oldest} and will be sent too: see clutchlife spool list")
 
 
 def _record(paths: list[Path], clutch_id: str) -> dict[str, Any] | None:
@@ -154,7 +139,7 @@ def _require_known(url: str, key: str | None, clutch_id: str) -> None:
             return
         except RefusedError as error:
             if error.unknown:
-                fail(str(error), EX_DATAERR)
+                options.fail(str(error), options.EX_DATAERR)
 
 
 def _register(service: Service, clutch_id: str, record: dict[str, Any] | None) -> None:
@@ -177,32 +162,38 @@ def list_runs(
     as_json: Annotated[bool, typer.Option("--json", help="Print the runs as JSON")] = False,
 ) -> None:
     """List the runs that wait, with the last answer; the refused runs, with the reason; and the replaced versions."""
-    with errors_in_a_line():
+    with options.errors_in_a_line():
         entries = _spooled_entries(spool, clutch)
         if as_json:
             typer.echo(json.dumps({"items": [_item(spool, entry) for entry in entries]}, indent=1, ensure_ascii=False))
             return
         _print(spool, entries)
         if not entries:
-            print_line(f"nothing is in the spool {spool}")
+            options.print_line(f"nothing is in the spool {spool}")
 
 
 @app.command()
 def send(
-    clutch: Clutch = None, url: Url = URL, key: Key = None, spool: SpoolFolder = SPOOL, patience: Patience = 60.0
+    clutch: Clutch = None,
+    url: options.Url = options.URL,
+    key: options.Key = None,
+    spool: SpoolFolder = SPOOL,
+    patience: options.Patience = 60.0,
 ) -> None:
     """Send the runs that wait for the service at --url. Runs for other addresses stay, because the key belongs to this
     service."""
-    with errors_in_a_line():
+    with options.errors_in_a_line():
         same_service: list[Spool] = []
         for each in Spool.every(spool) if clutch is None else [Spool.of(spool, url, clutch)]:
             count = len(each.waiting())
             if count and each.url == url.rstrip("/"):
                 same_service.append(each)
             elif count:
-                say(f"{count} runs in {each.folder} are not sent: they belong to {each.clutch_id} at {each.url}")
+                options.say(
+                    f"{count} runs in {each.folder} are not sent: they belong to {each.clutch_id} at {each.url}"
+                )
         if not same_service:
-            print_line(f"nothing waits for {url}")
+            options.print_line(f"nothing waits for {url}")
             return
         transmit(same_service, url, key, patience, lambda service, each: _register(service, each.clutch_id, None))
 
@@ -215,29 +206,29 @@ def empty(
     spool: SpoolFolder = SPOOL,
 ) -> None:
     """Show what is in the spool, ask whether to delete it, and then delete it for good."""
-    with errors_in_a_line():
+    with options.errors_in_a_line():
         listed = [entry for entry in _spooled_entries(spool, clutch) if entry.state != WAITING or not refused]
         if not listed:
-            print_line("nothing to delete")
+            options.print_line("nothing to delete")
             return
         _print(spool, listed)
         waiting = sum(entry.state == WAITING for entry in listed)
         question = f"Delete these {len(listed)} for good? {waiting} of them were never stored by the service."
         if not yes and not typer.confirm(question, err=True):
-            fail("nothing was deleted")
+            options.fail("nothing was deleted")
         try:
             for owner, entries in groupby(listed, _owner):
                 with Spool.of(spool, *owner).sending(0.0):
                     Spool.of(spool, *owner).discard(entries)
         except HeldError:
-            fail("another process is sending from the spool: try again when it has ended", EX_TEMPFAIL)
-        print_line(f"{len(listed)} deleted; the service never stored {waiting} of them")
+            options.fail("another process is sending from the spool: try again when it has ended", options.EX_TEMPFAIL)
+        options.print_line(f"{len(listed)} deleted; the service never stored {waiting} of them")
 
 
 def _spooled_entries(folder: Path, clutch: str | None) -> list[Entry]:
     """Everything in the spools, of one clutch where it is given."""
     if folder.exists() and not folder.is_dir():
-        fail(f"{folder} is not a folder", EX_DATAERR)
+        options.fail(f"{folder} is not a folder", options.EX_DATAERR)
     spools = [spool for spool in Spool.every(folder) if clutch in (None, spool.clutch_id)]
     return [entry for spool in spools for entry in (*spool.waiting(), *spool.refused(), *spool.replaced())]
 
@@ -270,9 +261,9 @@ def _item(folder: Path, entry: Entry) -> dict[str, Any]:
 def _print(folder: Path, kept: list[Entry]) -> None:
     """A line a clutch, and a line a run."""
     for (url, clutch_id), entries in groupby(kept, _owner):
-        print_line(f"{clutch_id} at {url}, in {folder}")
+        options.print_line(f"{clutch_id} at {url}, in {folder}")
         for entry in entries:
-            print_line(f"  {_line(entry)}")
+            options.print_line(f"  {_line(entry)}")
 
 
 def _line(entry: Entry) -> str:

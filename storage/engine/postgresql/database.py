@@ -22,24 +22,12 @@ from sqlalchemy.exc import SQLAlchemyError
 from storage.engine.database import LOCK_TIMEOUT, Database, Question, SharedAnswer, Snapshot, Watch, granted
 from storage.engine.errors import ServiceRuns, StorageError, StorageUnavailable
 from storage.engine.integrity import refuse_newer
-from storage.engine.postgresql.connect import (
-    SingleStatements,
-    commits,
-    count_commit,
-    hold_service_lock,
-    make_autocommit_engine,
-    make_engine,
-    migration_lock,
-    server_tables,
-    shown,
-    translated,
-    write_lock,
-)
+from storage.engine.postgresql import connect
 from storage.migrations.upgrade import current, head, upgrade
 
 shared_answer = sa.Table(
     "shared_answer",
-    server_tables,
+    connect.server_tables,
     sa.Column("clutch_id", sa.Text, primary_key=True),
     sa.Column("name", sa.Text, primary_key=True),
     sa.Column("release", sa.Text, nullable=False),
@@ -76,7 +64,7 @@ SELECT (SELECT number FROM commits) AS version,
 class ServerWatch(Watch):
     """The questions, one at a time for all who ask from the event loop."""
 
-    def __init__(self, statements: SingleStatements) -> None:
+    def __init__(self, statements: connect.SingleStatements) -> None:
         self._statements = statements
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="watch")
         self._waiting: list[tuple[Question, asyncio.Future[Snapshot]]] = []
@@ -148,7 +136,7 @@ class ServerWatch(Watch):
 
 
 #: A transaction that changed nothing has no number and is not counted.
-_COUNT = count_commit.where(sa.text("pg_current_xact_id_if_assigned() IS NOT NULL"))
+_COUNT = connect.count_commit.where(sa.text("pg_current_xact_id_if_assigned() IS NOT NULL"))
 
 
 class ServerDatabase(Database):
@@ -158,33 +146,36 @@ class ServerDatabase(Database):
     journal_mode = None
 
     def __init__(self, address: sa.URL, *, lock_timeout: float, found: bool = False, serving: bool = False) -> None:
-        super().__init__(shown(address), found=found)
+        super().__init__(connect.shown(address), found=found)
         self.url = address.render_as_string(hide_password=False)
         self._address = address
         self._lock_timeout = lock_timeout
-        self._engine = make_engine(address, lock_timeout)
+        self._engine = connect.make_engine(address, lock_timeout)
         self._readers = self._engine.execution_options(isolation_level="REPEATABLE READ", postgresql_readonly=True)
         # a statement of a writer sees what was committed before the lock was free
         self._writers = self._engine.execution_options(isolation_level="READ COMMITTED", postgresql_readonly=found)
         # what every request asks does not wait for connections by which answers are read and written
-        watching = make_autocommit_engine(address, lock_timeout, connections=1)
-        sharing = make_autocommit_engine(address, lock_timeout, connections=2)
+        watching = connect.make_autocommit_engine(address, lock_timeout, connections=1)
+        sharing = connect.make_autocommit_engine(address, lock_timeout, connections=2)
         if serving:
             for engine in (self._engine, watching, sharing):
-                hold_service_lock(engine, self.name)
-        self._watching, self._sharing = SingleStatements(watching, self.name), SingleStatements(sharing, self.name)
+                connect.hold_service_lock(engine, self.name)
+        self._watching, self._sharing = (
+            connect.SingleStatements(watching, self.name),
+            connect.SingleStatements(sharing, self.name),
+        )
         self.watch = ServerWatch(self._watching)
 
     @contextmanager
     def _read(self) -> Iterator[sa.Connection]:
-        with translated(self.name), self._readers.begin() as connection:
+        with connect.translated(self.name), self._readers.begin() as connection:
             yield connection
 
     @contextmanager
     def writing(self, *, of: str | None = None) -> Iterator[sa.Connection]:
         self._refuse_closed()
-        with translated(self.name), self._writers.begin() as connection:
-            write_lock(connection, of)
+        with connect.translated(self.name), self._writers.begin() as connection:
+            connect.write_lock(connection, of)
             yield connection
             connection.execute(_COUNT)
 
@@ -226,16 +217,16 @@ class ServerDatabase(Database):
             return
         try:
             with (
-                migration_lock(self._address, self._lock_timeout) if to_migrate == "older" else nullcontext(),
+                connect.migration_lock(self._address, self._lock_timeout) if to_migrate == "older" else nullcontext(),
                 self.writing() as connection,
             ):
                 revision = current(connection)  # another process may have been before
                 if revision != head():
                     refuse_newer(revision)
                     upgrade(connection)
-                server_tables.create_all(connection)
+                connect.server_tables.create_all(connection)
                 if revision is None:
-                    connection.execute(commits.insert().values(number=0))
+                    connection.execute(connect.commits.insert().values(number=0))
         except ServiceRuns:
             # the service that runs may be the one that was before, and has nothing left to do
             if self._to_migrate() is not None:
@@ -247,7 +238,7 @@ class ServerDatabase(Database):
         with self.reading() as connection:
             _require_utf8(connection, self.name)
             revision = current(connection)
-            has_server_tables = set(sa.inspect(connection).get_table_names()) >= set(server_tables.tables)
+            has_server_tables = set(sa.inspect(connection).get_table_names()) >= set(connect.server_tables.tables)
         if revision == head() and has_server_tables:
             return None
         return "empty" if revision is None else "older"

@@ -18,16 +18,7 @@ from sqlalchemy import Connection
 
 from storage.engine.database import LOCK_TIMEOUT
 from storage.engine.errors import DatabaseBusy, StorageUnavailable
-from storage.engine.sqlite.connect import (
-    DRIVER_ERRORS,
-    WriteLock,
-    make_if_missing,
-    make_new,
-    path_of,
-    read_only,
-    service_lock,
-    translated,
-)
+from storage.engine.sqlite import connect
 
 #: Findings of one kind that are listed. Chosen: a screenful; SQLite's own default is 100.
 _MAX_LISTED = 20
@@ -44,7 +35,7 @@ def damage(connection: Connection) -> list[str]:
 
 def require_whole(path: Path) -> None:
     """Raise sqlite3.DatabaseError unless the file at `path` is a whole database of this program, at whatever revision."""
-    with closing(sqlite3.connect(read_only(path), uri=True)) as connection:
+    with closing(sqlite3.connect(connect.read_only(path), uri=True)) as connection:
         (line,) = connection.execute("PRAGMA integrity_check(1)").fetchone()
         if line != "ok":
             raise sqlite3.DatabaseError(f"it is damaged: {line}")
@@ -60,12 +51,12 @@ def copy(source: Path, target: Path, *, lock_timeout: float) -> None:
     Raises FileExistsError where `target` exists.
     """
     try:
-        make_new(target)
+        connect.make_new(target)
     except FileExistsError as error:
         raise FileExistsError(f"{target} exists already: name a new file for the backup") from error
     partial = target.with_name(f"{target.name}.partial")
     try:
-        make_if_missing(partial)
+        connect.make_if_missing(partial)
         copy_whole(source, partial, lock_timeout)
         renamed(partial, target)
     except BaseException:
@@ -113,7 +104,7 @@ def renamed(path: Path, target: Path) -> Path:
 def copy_whole(source: Path, target: Path, lock_timeout: float) -> None:
     """Copy the database at `source` into the new file `target`, which is whole only at the end."""
     with (
-        closing(sqlite3.connect(read_only(source), uri=True, timeout=lock_timeout)) as origin,
+        closing(sqlite3.connect(connect.read_only(source), uri=True, timeout=lock_timeout)) as origin,
         closing(sqlite3.connect(target)) as copied,
     ):
         origin.backup(copied)
@@ -132,16 +123,16 @@ def restore(url: str, backup: Path, *, lock_timeout: float = LOCK_TIMEOUT) -> Pa
     service uses the database, DatabaseBusy while anything else does, StorageUnavailable where `backup` is no whole database;
     then nothing has changed.
     """
-    path = path_of(url)
+    path = connect.path_of(url)
     if not backup.is_file():
         raise FileNotFoundError(f"there is no backup at {backup}")
     if path.exists() and path.samefile(backup):
         raise ValueError(f"{backup} is the database itself")
     partial = path.with_name(f"{path.name}-restored.partial")
-    with service_lock(path), closing(WriteLock(path, lock_timeout)) as lock, lock.held():
+    with connect.service_lock(path), closing(connect.WriteLock(path, lock_timeout)) as lock, lock.held():
         partial.unlink(missing_ok=True)
         try:
-            with translated(backup):
+            with connect.translated(backup):
                 try:
                     require_whole(backup)
                     copy_whole(backup, partial, lock_timeout)
@@ -172,7 +163,7 @@ def _settle(path: Path) -> None:
     try:
         with closing(sqlite3.connect(path, timeout=0.0, isolation_level=None)) as connection:
             connection.execute("PRAGMA journal_mode=DELETE")
-    except DRIVER_ERRORS as error:
+    except connect.DRIVER_ERRORS as error:
         code = getattr(error, "sqlite_errorcode", 0) & 0xFF
         if code in (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED):
             raise DatabaseBusy(f"{path}: another process has the database open: end it first") from error

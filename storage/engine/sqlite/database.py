@@ -19,22 +19,8 @@ from sqlalchemy.exc import OperationalError
 from storage.engine.database import LOCK_TIMEOUT, Database, Question, Snapshot, Watch, granted
 from storage.engine.errors import StorageUnavailable
 from storage.engine.integrity import refuse_newer
+from storage.engine.sqlite import connect
 from storage.engine.sqlite.backup import copy, copy_beside, damage
-from storage.engine.sqlite.connect import (
-    JOURNAL_MODE,
-    WriteLock,
-    connect_shared,
-    found_journal_mode,
-    make_engine,
-    make_if_missing,
-    path_of,
-    read_only,
-    service_lock,
-    set_journal_mode,
-    transaction,
-    translated,
-    wanted_journal_mode,
-)
 from storage.migrations.upgrade import current, head, upgrade
 
 
@@ -47,11 +33,11 @@ def _fault_of_file(path: Path, journal_mode: str) -> str | None:
     if not path.exists():
         return "the file is not there"
     try:
-        with closing(sqlite3.connect(read_only(path), uri=True, timeout=0.0)) as connection:
+        with closing(sqlite3.connect(connect.read_only(path), uri=True, timeout=0.0)) as connection:
             (revision,) = connection.execute("SELECT version_num FROM alembic_version").fetchone()
     except sqlite3.Error as error:
         busy = getattr(error, "sqlite_errorcode", 0) & 0xFF == sqlite3.SQLITE_BUSY
-        if journal_mode == JOURNAL_MODE or not busy:
+        if journal_mode == connect.JOURNAL_MODE or not busy:
             return f"the file cannot be read: {error}"
     else:
         if revision != head():
@@ -77,7 +63,7 @@ class FileWatch(Watch):
         self._rows: dict[tuple[str, tuple[object, ...]], tuple[Any, ...] | None] = {}
         self._rows_version = -1
         self._closed = False
-        self._connection = connect_shared(path, lock_timeout, writable=writable)
+        self._connection = connect.connect_shared(path, lock_timeout, writable=writable)
 
     def snapshots(self, questions: Sequence[Question]) -> list[Snapshot]:
         with self._lock:
@@ -123,7 +109,7 @@ class FileWatch(Watch):
     def _first(self, query: str, values: tuple[object, ...]) -> tuple[Any, ...] | None:
         if self._closed:
             raise StorageUnavailable(f"the database {self._path} has been closed")
-        with translated(self._path):
+        with connect.translated(self._path):
             # fetched to the end: an open statement would keep the log from being written back
             rows = self._connection.execute(query, values).fetchall()
         return rows[0] if rows else None
@@ -140,20 +126,24 @@ class FileDatabase(Database):
         super().__init__(str(path), found=found)
         self.path, self.url = path, f"sqlite:///{path.absolute()}"
         self.journal_mode = journal_mode
-        self._write_lock = WriteLock(path, lock_timeout)
-        self._engine = make_engine(path, lock_timeout, writable=not found)
-        with translated(path):
+        self._write_lock = connect.WriteLock(path, lock_timeout)
+        self._engine = connect.make_engine(path, lock_timeout, writable=not found)
+        with connect.translated(path):
             self.watch = FileWatch(path, lock_timeout, writable=not found)
 
     @contextmanager
     def _read(self) -> Iterator[Connection]:
-        with translated(self.path), transaction(self._engine, "BEGIN") as connection:
+        with connect.translated(self.path), connect.transaction(self._engine, "BEGIN") as connection:
             yield connection
 
     @contextmanager
     def writing(self, *, of: str | None = None) -> Iterator[Connection]:  # noqa: ARG002  (a file has one writer)
         self._refuse_closed()
-        with self._write_lock.held(), translated(self.path), transaction(self._engine, "BEGIN IMMEDIATE") as connection:
+        with (
+            self._write_lock.held(),
+            connect.translated(self.path),
+            connect.transaction(self._engine, "BEGIN IMMEDIATE") as connection,
+        ):
             yield connection
 
     def close(self) -> None:
@@ -190,8 +180,8 @@ def find_file(path: Path) -> FileDatabase:
 
     Raises DatabaseTooNew as `open_file` does, StorageUnavailable where there is no such file.
     """
-    with translated(path):
-        journal_mode = found_journal_mode(path, LOCK_TIMEOUT)
+    with connect.translated(path):
+        journal_mode = connect.found_journal_mode(path, LOCK_TIMEOUT)
     database = FileDatabase(path, journal_mode=journal_mode, lock_timeout=LOCK_TIMEOUT, found=True)
     return database.where(lambda connection: refuse_newer(current(connection)))
 
@@ -201,8 +191,8 @@ def back_up(url: str, target: Path) -> None:
 
     Raises FileExistsError where `target` exists, StorageUnavailable as `find_file` does, ValueError on another address.
     """
-    path = path_of(url)
-    with translated(path):
+    path = connect.path_of(url)
+    with connect.translated(path):
         copy(path, target, lock_timeout=LOCK_TIMEOUT)
 
 
@@ -218,12 +208,12 @@ def open_file(path: Path, *, lock_timeout: float = LOCK_TIMEOUT, serving: bool =
     A file that has its log and lacks no migration is only read, without the write lock: a process that yields to all
     others would hold it for as long as they are busy.
     """
-    with translated(path):
+    with connect.translated(path):
         journal_mode = _mode_if_up_to_date(path, lock_timeout)
         if journal_mode is None:
-            with closing(WriteLock(path, lock_timeout)) as lock, lock.held():
-                make_if_missing(path)
-                journal_mode = set_journal_mode(path, lock_timeout)
+            with closing(connect.WriteLock(path, lock_timeout)) as lock, lock.held():
+                connect.make_if_missing(path)
+                journal_mode = connect.set_journal_mode(path, lock_timeout)
                 _migrate(path, lock_timeout, serving=serving)
     return FileDatabase(path, journal_mode=journal_mode, lock_timeout=lock_timeout)
 
@@ -233,10 +223,10 @@ def _mode_if_up_to_date(path: Path, lock_timeout: float) -> str | None:
     if not path.is_file():
         return None
     try:
-        journal_mode = wanted_journal_mode(path, lock_timeout)
+        journal_mode = connect.wanted_journal_mode(path, lock_timeout)
         if journal_mode is None:
             return None
-        with transaction(make_engine(path, lock_timeout, pooled=False), "BEGIN") as connection:
+        with connect.transaction(connect.make_engine(path, lock_timeout, pooled=False), "BEGIN") as connection:
             return journal_mode if current(connection) == head() else None
     except (sqlite3.OperationalError, OperationalError):  # under the lock it is found out why
         return None
@@ -245,17 +235,17 @@ def _mode_if_up_to_date(path: Path, lock_timeout: float) -> str | None:
 def _migrate(path: Path, lock_timeout: float, *, serving: bool) -> None:
     """Run the missing steps in one immediate transaction; the caller holds the write lock, so that one process does."""
     # A step may rebuild a table that others refer to, so keys are checked once at the end.
-    engine = make_engine(path, lock_timeout, foreign_keys=False, pooled=False)
-    with transaction(engine, "BEGIN") as connection:
+    engine = connect.make_engine(path, lock_timeout, foreign_keys=False, pooled=False)
+    with connect.transaction(engine, "BEGIN") as connection:
         revision = current(connection)
     if revision == head():
         return
     refuse_newer(revision)
     in_use = revision is not None
-    with service_lock(path) if in_use and not serving else nullcontext():
+    with connect.service_lock(path) if in_use and not serving else nullcontext():
         if in_use:
             copy_beside(path, f"before-{head()}", lock_timeout=lock_timeout)
-        with transaction(engine, "BEGIN IMMEDIATE") as connection:
+        with connect.transaction(engine, "BEGIN IMMEDIATE") as connection:
             upgrade(connection)
             broken = connection.exec_driver_sql("PRAGMA foreign_key_check").fetchall()
             if broken:

@@ -14,7 +14,7 @@ from service.work.process import Work
 from service.work.queue import JobQueue, Kind
 from storage import jobs
 from storage.engine.database import Database
-from storage.jobs import JobRow, NewJob
+from storage.jobs import JobRow
 from tests.service.work.waiting import until
 
 ADDRESS = "postgresql+psycopg://u:s3cr3t@host/db"
@@ -45,7 +45,7 @@ def test_no_argument_shows_the_address_of_the_database(monkeypatch: pytest.Monke
 
 def ask(database: Database, job_id: str, kind: str) -> None:
     arguments = {"request": ""}
-    new = NewJob(job_id=job_id, kind=kind, clutch_id=None, asked_at=AT, asked_by="local", arguments=arguments)
+    new = JobRow(job_id=job_id, kind=kind, clutch_id=None, asked_at=AT, asked_by="local", arguments=arguments)
     with database.writing() as connection:
         jobs.insert(connection, new)
 

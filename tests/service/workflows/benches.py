@@ -26,7 +26,7 @@ from service.workflows import change_run, edit_clutch, ingest_run
 from service.workflows.adopt_model import adopt
 from service.workflows.ingest_run import ingest
 from storage import changes, diagnoses, results
-from storage.diagnoses import NewDiagnosis
+from storage.diagnoses import DiagnosisRow
 from storage.engine.database import Database
 from storage.engine.opening import open_database
 from tests.service.workflows import stand_in_engine
@@ -114,7 +114,7 @@ class Bench:
 
     def diagnose(self, diagnosis_id: str, life: str, revision: int = 10**6) -> None:
         """Store a finished diagnosis of a life, whose extension the stand-in applies."""
-        row = NewDiagnosis(
+        row = DiagnosisRow(
             clutch_id=CLUTCH, diagnosis_id=diagnosis_id, created_at=AT, revision=revision, last_run_key=0, life=life,
             as_of_cycles=None, code_version="0",
         )  # fmt: skip

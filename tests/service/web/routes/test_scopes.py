@@ -13,7 +13,7 @@ from fastapi.testclient import TestClient
 
 from service.web.auth import SCOPES, Scope, is_loopback
 from storage import jobs, keys
-from storage.jobs import NewJob
+from storage.jobs import JobRow
 from tests.service.clients import client_on
 from tests.service.web.routes.granting import AT, context_of, granted, revoke_all
 from tests.service.work.waiting import until
@@ -180,7 +180,7 @@ def test_a_key_bound_to_one_clutch_sees_and_cancels_jobs_of_that_alone(client: T
     with context_of(client).database.writing() as connection:
         for clutch_id in ("c1", "c2", None):
             of = {"job_id": f"j-{clutch_id}", "kind": jobs.DIAGNOSIS, "clutch_id": clutch_id, "arguments": arguments}
-            jobs.insert(connection, NewJob(asked_at=AT, asked_by="local", **of))
+            jobs.insert(connection, JobRow(asked_at=AT, asked_by="local", **of))
             jobs.end(connection, f"j-{clutch_id}", jobs.FINISHED, AT)
     bound = granted(client, "admin", clutches=["c2"])
     assert [item["job_id"] for item in client.get("/v1/jobs", headers=bound).json()["items"]] == ["j-c2"]

@@ -21,7 +21,7 @@ from storage.engine.errors import (
 )
 from storage.engine.integrity import other_schema
 from storage.engine.opening import database_exists, find_database, open_database
-from storage.engine.postgresql import database as server
+from storage.engine.postgresql import connect as server
 from storage.migrations.upgrade import current, head
 from tests.storage.engine.postgresql.server import PostgresServer, postgresql_server
 from tests.storage.samples import clutch_row, columns, store_run, take_back
