@@ -42,6 +42,7 @@ from storage import assumptions, changes, clutches, diagnoses, inspections, jobs
 from storage.clutches import ClutchRow
 from storage.diagnoses import DiagnosisRow, VerdictRow
 from storage.encoding import Json
+from storage.engine.database import Database
 from storage.inspections import InspectionRow, PhotographRow
 from storage.jobs import JobRow
 from storage.results import FilterStateRow, FitRow, PredictionRow
@@ -257,6 +258,19 @@ def attempts(clutch_id: str) -> Iterator[int]:
     )
 
 
+def replace_results(database: Database, state: ClutchState, computed: Results) -> bool:
+    """Store a clutch's results where its revision still is that of the state they follow from; whether it was. The revision
+    moves on where an answer changes."""
+    with database.writing() as connection:
+        is_unchanged = unchanged(connection, state.clutch_id, state.revision)
+        if is_unchanged:
+            before = answers(connection, state.clutch_id)
+            store(connection, state.clutch_id, computed)
+            if answers(connection, state.clutch_id) != before:
+                clutches.bump_revision(connection, state.clutch_id)
+    return is_unchanged
+
+
 def store(connection: Connection, clutch_id: str, computed: Results) -> None:
     """Store results in place of those that were there. The revision is the workflow's to move on."""
     if computed.levels or computed.receipts or computed.corrected:
@@ -264,7 +278,10 @@ def store(connection: Connection, clutch_id: str, computed: Results) -> None:
         for run_id, own in computed.levels.items():
             results.write_fits(connection, rows[run_id], fit_rows(own, computed.cofs.get(run_id, {})))
         for run_id, receipt in computed.receipts.items():
-            runs.set_receipt(connection, rows[run_id], receipt)
+            if run_id in computed.details:
+                runs.set_results(connection, rows[run_id], computed.details[run_id], receipt, CODE_VERSION)
+            else:
+                runs.set_receipt(connection, rows[run_id], receipt)
     if computed.corrected_again:
         assumptions.clear_corrected_cofs(connection, clutch_id)
     for run_id, cofs in computed.corrected.items():

@@ -15,17 +15,16 @@ from service import records
 from service.columns import whole
 from service.errors import InvalidError, NotFoundError
 from service.lives.engagements import DUTY_KINDS, StoredEngagement, stored_engagement
-from service.lives.history import ByPressure, Event, order, stationary_tests_of
+from service.lives.history import Event, order, stationary_tests_of
 from service.lives.incoming_run import IncomingRun
 from service.lives.model_correction import RunReader
 from service.lives.outlook import Evidence, engagement_rows, needs_evidence, summarised
 from service.lives.payloads import receipt
 from service.lives.plausibility.doubts import doubts_alone
-from service.lives.recomputation import ClutchState, Levels, Receipt, Results, Tracking, computed_again, computed_aside
+from service.lives.recomputation import ClutchState, Levels, Receipt, Results, Tracking, computed_again, with_set_aside
 from service.lives.run_analysis import analyse
 from service.schemas.clutch import ClutchIn
-from service.settings import CODE_VERSION
-from storage import channels, results, runs
+from storage import channels, runs
 from storage.blobs import raw_stores
 from storage.engine.database import Database
 from storage.engine.errors import DamagedData
@@ -152,18 +151,6 @@ def incoming(row: RunRow, columns: Mapping[str, NDArray[np.float64]]) -> Incomin
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Recomputed:
-    """All results of a clutch, computed again from its raw runs: what stands beside each run's channels and its receipt by
-    run_id, the levels and mean COFs of runs that are none of the history, and what follows from the history."""
-
-    details: Mapping[str, dict[str, Any]]
-    receipts: Mapping[str, Receipt]
-    aside: Mapping[str, ByPressure]
-    levels: Levels
-    results: Results
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Recorded:
     """All that a clutch's results are computed from: its state, its runs in the order of their arrival, those that are none
     of the history, and their channels. Picklable where it was loaded whole."""
@@ -183,7 +170,7 @@ def recorded(database: Database, state: ClutchState, *, whole: bool = False) -> 
     return Recorded(state=state, rows=tuple(rows), aside=aside, reader=reader)
 
 
-def recomputed(recorded: Recorded) -> Recomputed:
+def recomputed(recorded: Recorded) -> Results:
     """Every run of a clutch analysed again, under the state's record, and all that follows.
 
     Raises InvalidError where this code refuses a run that is stored, DamagedData where its channels are damaged.
@@ -206,11 +193,8 @@ def recomputed(recorded: Recorded) -> Recomputed:
     held = tuple(replace(event, **measured[event.run_id]) for event in state.held)
     state = replace(state, events=events, held=held)
     final, computed = computed_again(state, levels, receipts, reader, evaluated={})
-    cofs = {}
-    for run_id, event in aside.items():
-        event = replace(event, **measured[run_id])
-        cofs[run_id], own = computed_aside(final, event, levels, reader)
-        receipts[run_id] |= own
+    set_aside = [replace(event, **measured[run_id]) for run_id, event in aside.items()]
+    computed = with_set_aside(computed, final, set_aside, levels, receipts, reader)
     receipts |= computed.receipts
     engagements = {row.run_id: stored_engagement(receipts[row.run_id], details[row.run_id]) for row in rows}
     evidence = Evidence(
@@ -220,19 +204,4 @@ def recomputed(recorded: Recorded) -> Recomputed:
         reader=reader,
     )
     summary = summarised(final, computed.tracking or Tracking(), evidence)
-    return Recomputed(
-        details=details,
-        receipts=receipts,
-        aside=cofs,
-        levels=levels,
-        results=replace(computed, receipts={}, summary=summary),
-    )
-
-
-def store_recomputed(connection: Connection, clutch_id: str, again: Recomputed) -> None:
-    """Store results in place of all that there were. The revision is the workflow's to move on."""
-    keys = runs.keys(connection, clutch_id)
-    for run_id, run_key in keys.items():
-        results.write_fits(connection, run_key, records.fit_rows(again.levels[run_id], again.aside.get(run_id, {})))
-        runs.set_results(connection, run_key, again.details[run_id], again.receipts[run_id], CODE_VERSION)
-    records.store(connection, clutch_id, again.results)
+    return replace(computed, details=details, receipts=receipts, levels=levels, summary=summary)

@@ -129,12 +129,14 @@ class Tracking:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Results:
     """What is to be stored of a clutch: mean COFs by run_id beside their levels, receipts that change, corrected mean COFs
-    (in place of all where `corrected_again`), the tracking and the summary (None: it stays); what changes in the doubts
-    about other runs; and, where it changes what an ended life teaches, the kind of clutches that it `teaches`."""
+    (in place of all where `corrected_again`), the tracking and the summary (None: it stays); `details`, which stand beside a
+    run's channels, of runs that were analysed again; what changes in the doubts about other runs; and, where it changes what
+    an ended life teaches, the kind of clutches that it `teaches`."""
 
     levels: Levels = field(default_factory=dict)
     cofs: Mapping[str, history.ByPressure] = field(default_factory=dict)
     receipts: Mapping[str, Receipt] = field(default_factory=dict)
+    details: Mapping[str, dict[str, Any]] = field(default_factory=dict)
     corrected: Mapping[str, history.Corrected] = field(default_factory=dict)
     corrected_again: bool = False
     tracking: Tracking | None = None
@@ -197,19 +199,6 @@ def cofs_among(state: ClutchState, event: history.Event, levels: Sequence[LevelF
     return _cofs_of_tests([life], {event.run_id: levels}, state.geometry).get(event.run_id, {})
 
 
-def computed_aside(
-    state: ClutchState, event: history.Event, levels: Levels, reader: RunReader
-) -> tuple[history.ByPressure, Receipt]:
-    """The mean COFs of a run that is none of the history, as they would be among it, and what its receipt says of it."""
-    fits = levels.get(event.run_id, ())
-    state_with_event = replace(state, events=history.order([*state.events, event]))
-    evaluated = history.stationary_tests_of(state_with_event.events)
-    evaluated.pop(event.run_id, None)
-    cofs = cofs_among(state, event, fits)
-    loops = loops_again(state_with_event, levels, reader, evaluated)
-    return cofs, {"fits": fit_items(fits, cofs), "loops": loops.get(event.run_id, [])}
-
-
 def with_set_aside(
     computed: Results,
     state: ClutchState,
@@ -218,15 +207,18 @@ def with_set_aside(
     receipts: Mapping[str, Receipt],
     reader: RunReader,
 ) -> Results:
-    """The results with those of runs that are taken out of the history, whose receipts lose the warnings of the history."""
-    cofs, fresh = {**computed.cofs}, {**computed.receipts}
-    own_levels = {**computed.levels}
+    """The results with those of runs that are none of the history: their mean COFs and loops as they would be among it, and
+    receipts without the warnings of the history."""
+    cofs, fresh, own_levels = {**computed.cofs}, {**computed.receipts}, {**computed.levels}
     for event in events:
-        name, receipt = event.run_id, receipts[event.run_id]
-        cofs[name], parts = computed_aside(state, event, levels, reader)
-        own_levels[name] = levels.get(name, ())
-        warnings = [warning for warning in receipt["warnings"] if warning["code"] not in OF_HISTORY]
-        fresh[name] = receipt | parts | {"warnings": warnings}
+        name, fits = event.run_id, levels.get(event.run_id, ())
+        state_with_event = replace(state, events=history.order([*state.events, event]))
+        evaluated = history.stationary_tests_of(state_with_event.events)
+        evaluated.pop(name, None)
+        loops = loops_again(state_with_event, levels, reader, evaluated).get(name, [])
+        cofs[name], own_levels[name] = cofs_among(state, event, fits), fits
+        warnings = [warning for warning in receipts[name]["warnings"] if warning["code"] not in OF_HISTORY]
+        fresh[name] = receipts[name] | {"fits": fit_items(fits, cofs[name]), "loops": loops, "warnings": warnings}
     return replace(computed, cofs=cofs, levels=own_levels, receipts=fresh)
 
 

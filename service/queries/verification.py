@@ -19,6 +19,7 @@ from service.columns import bar
 from service.errors import InvalidError
 from service.lives.assumptions import ALL_PRESSURES
 from service.lives.incoming_run import content_hash
+from service.lives.recomputation import Results
 from service.lives.tracks import CARRIED
 from service.records import inspection_hash
 from service.settings import CODE_VERSION
@@ -138,14 +139,13 @@ def _stored(connection: Connection, clutch_id: str) -> _Results:
     return named
 
 
-def _recomputed(computed: stored_runs.Recomputed) -> dict[str, Any]:
+def _recomputed(computed: Results) -> dict[str, Any]:
     named = {f"the receipt of run {run_id}": _plain(receipt) for run_id, receipt in computed.receipts.items()}
-    cofs = {**computed.aside, **computed.results.cofs}
-    for run_id, levels in {**computed.levels, **computed.results.levels}.items():
-        rows = records.fit_rows(levels, cofs.get(run_id, {}))
+    for run_id, levels in computed.levels.items():
+        rows = records.fit_rows(levels, computed.cofs.get(run_id, {}))
         named |= {_fit(run_id, row.pressure): _plain(asdict(row)) for row in rows}
-    if computed.results.tracking is not None:
-        for item in computed.results.tracking.predictions:
+    if computed.tracking is not None:
+        for item in computed.tracking.predictions:
             named[_prediction(item.method, item.cycles)] = _plain(item.payload)
     return named
 

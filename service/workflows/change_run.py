@@ -44,8 +44,7 @@ from service.lives.recomputation import (
 )
 from service.lives.run_analysis import analyse
 from service.run_files.upload import read_file_run
-from service.settings import CODE_VERSION
-from storage import changes, channels, results, runs
+from storage import changes, channels, runs
 from storage.channels import Encoded
 from storage.engine.database import Database
 from storage.runs import RunRow
@@ -326,6 +325,9 @@ def _computed(database: Database, loaded: _Loaded, rows: Sequence[RunRow]) -> tu
     )
     kind = after.kind if teaches else None
     computed = replace(computed, receipts=changed, summary=summary, judged=judged, teaches=kind)
+    if loaded.again is not None:
+        name, fits = loaded.row.run_id, loaded.again.analysis.fits
+        computed = replace(computed, details={name: loaded.again.kept}, levels={name: fits, **computed.levels})
     return tuple(replace(row, receipt=changed[row.run_id]) for row in rows), computed
 
 
@@ -338,10 +340,6 @@ def _store(
         runs.set_state(
             connection, row.run_key, state=row.state, cycles=row.cycles, sent_cycles=row.sent_cycles, doubts=row.doubts
         )
-        if loaded.again is not None:
-            analysis = loaded.again.analysis
-            runs.set_results(connection, row.run_key, loaded.again.kept, row.receipt, CODE_VERSION)
-            results.write_fits(connection, row.run_key, records.fit_rows(analysis.fits, {}))
     revision = records.store_change(connection, clutch_id, computed, by=request.by, at=request.at)
     for was, row in zip(loaded.rows, changed, strict=True):
         before, after = records.summary(was), records.summary(row)

@@ -17,7 +17,6 @@ from service.errors import ConflictError
 from service.lives.condition import RANK_UNKNOWN
 from service.lives.recomputation import Results
 from service.schemas.clutch import ClutchIn
-from service.stored_runs import Recomputed
 from storage import changes, clutches
 from storage.clutches import ClutchRow
 from storage.engine.database import Database
@@ -30,7 +29,7 @@ class _Edited:
     before: ClutchRow
     record: dict[str, Any]
     archived: bool
-    results: Results | Recomputed | None
+    results: Results | None
 
 
 def edit(
@@ -70,7 +69,7 @@ def _computed(database: Database, clutch_id: str, fields: Mapping[str, Any], arc
     )
 
 
-def _results(database: Database, before: ClutchIn, record: ClutchIn) -> Results | Recomputed:
+def _results(database: Database, before: ClutchIn, record: ClutchIn) -> Results:
     """The results that the changed record gives."""
     with database.reading() as connection:
         state = records.state(connection, record.clutch_id, edited=record)
@@ -106,9 +105,7 @@ def _store(connection: Connection, edited: _Edited, *, reason: str, by: str, at:
         registered=row.record if row.registered is None and edited.results is not None else row.registered,
         archived=edited.archived,
     )
-    if isinstance(edited.results, Recomputed):
-        stored_runs.store_recomputed(connection, clutch_id, edited.results)
-    elif edited.results is not None:
+    if edited.results is not None:
         records.store(connection, clutch_id, edited.results)
     raising.evaluate(connection, clutch_id)  # an archived one has no alarms
     revision = clutches.bump_revision(connection, clutch_id)

@@ -314,7 +314,7 @@ def _brought_up(database: Database, names: Sequence[str], executor: Executor) ->
         return state, receipts, evidence
 
     def store(tracked: _Tracked, retracked: Results) -> bool:
-        return _replaced(database, tracked[0], retracked)
+        return records.replace_results(database, tracked[0], retracked)
 
     return in_rounds(executor, names, load=load, compute=_retracked, store=store, rounds=MAX_ATTEMPTS)
 
@@ -327,13 +327,3 @@ def _retracked(tracked: _Tracked) -> Results:
         receipts=warned_again(state.lives, tracking.warnings, receipts),
         summary=summarised(state, tracking, evidence),
     )
-
-
-def _replaced(database: Database, state: ClutchState, results: Results) -> bool:
-    """Store a clutch's results where its revision still is that of the state they follow from; whether it was."""
-    with database.writing() as connection:
-        unchanged = records.unchanged(connection, state.clutch_id, state.revision)
-        if unchanged:
-            records.store(connection, state.clutch_id, results)
-            clutches.bump_revision(connection, state.clutch_id)
-    return unchanged

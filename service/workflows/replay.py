@@ -2,12 +2,12 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from functools import partial
 
 from service import records, stored_runs
 from service.errors import BusyError, ServiceError
 from service.lives.criteria import MAX_ATTEMPTS
-from service.stored_runs import Recomputed, Recorded
+from service.lives.recomputation import Results
+from service.stored_runs import Recorded
 from service.work.executor import Ended, Ending, Executor, WorkerLostError, in_rounds
 from service.work.workflow import Task
 from storage import clutches
@@ -21,7 +21,7 @@ def clutch_ids(database: Database) -> list[str]:
         return clutches.all_ids(connection)
 
 
-def replay(database: Database, clutch_ids: Sequence[str], executor: Executor) -> Iterator[Ended[Recomputed]]:
+def replay(database: Database, clutch_ids: Sequence[str], executor: Executor) -> Iterator[Ended[Results]]:
     """Fit and track all runs of these clutches again; each as it ends.
 
     A clutch of which runs came at each of MAX_ATTEMPTS has a BusyError; errors that are nobody's data are raised. The
@@ -33,7 +33,10 @@ def replay(database: Database, clutch_ids: Sequence[str], executor: Executor) ->
             state = records.state(connection, clutch_id)
         return stored_runs.recorded(database, state, whole=executor.elsewhere)
 
-    store, compute = partial(_replaced, database), stored_runs.recomputed
+    def store(recorded: Recorded, computed: Results) -> bool:
+        return records.replace_results(database, recorded.state, computed)
+
+    compute = stored_runs.recomputed
     for ended in in_rounds(executor, clutch_ids, load=load, compute=compute, store=store, rounds=MAX_ATTEMPTS):
         if ended.ending is Ending.LEFT:
             yield replace(ended, error=BusyError(_LEFT))
@@ -62,16 +65,3 @@ def as_job(
 
 
 _LEFT = f"unchanged: runs arrived during each of {MAX_ATTEMPTS} attempts; replay it when fewer runs arrive"
-
-
-def _replaced(database: Database, recorded: Recorded, replayed: Recomputed) -> bool:
-    """Store a clutch's results where its revision still is that of the state they follow from; whether it was."""
-    clutch_id = recorded.state.clutch_id
-    with database.writing() as connection:
-        unchanged = records.unchanged(connection, clutch_id, recorded.state.revision)
-        if unchanged:
-            before = records.answers(connection, clutch_id)
-            stored_runs.store_recomputed(connection, clutch_id, replayed)
-            if records.answers(connection, clutch_id) != before:
-                clutches.bump_revision(connection, clutch_id)
-    return unchanged

@@ -92,7 +92,7 @@ def costs(database: Database) -> dict[str, float]:
         computed = stored_runs.recomputed(recorded)
         marks.append(time.process_time())
         with database.writing() as connection:
-            stored_runs.store_recomputed(connection, clutch_id, computed)
+            records.store(connection, clutch_id, computed)
         marks.append(time.process_time())
         for step, began, ended in zip(taken, marks, marks[1:], strict=False):
             taken[step] += 1e3 * (ended - began) / len(names)

@@ -19,6 +19,7 @@ from service.cli.main import app
 from service.lives import model_correction, recomputation, run_analysis, tracks
 from service.lives.criteria import MAX_ATTEMPTS
 from service.lives.incoming_run import IncomingRun, name_run
+from service.lives.recomputation import Results
 from service.queries import degradation
 from service.schemas.clutch import ClutchIn
 from service.workflows import adopt_model, edit_clutch, ingest_run, learn_fleet
@@ -119,7 +120,7 @@ def test_a_replay_beside_a_rig_that_never_rests_ends_and_says_why(
     attempts = []
     recomputed = stored_runs.recomputed
 
-    def recomputed_late(recorded: stored_runs.Recorded) -> stored_runs.Recomputed:
+    def recomputed_late(recorded: stored_runs.Recorded) -> Results:
         made = recomputed(recorded)
         if recorded.state.clutch_id == CLUTCH:
             attempts.append(recorded.state.revision)
