@@ -21,6 +21,7 @@ from models.degradation.severity import Block
 from models.friction.speed_protocol import protocol_speeds
 from models.records.criteria import LEVEL_GAP, LEVEL_GAP_SHARE
 from models.tracking.measurement import Measurement
+from models.tracking.prior import Prior
 from service.columns import RADIANS_PER_SECOND_PER_RPM
 from service.errors import LifeEndedError
 from service.lives.assumptions import ALL_PRESSURES, MEAN_COF, Assumptions, Scale
@@ -113,10 +114,10 @@ class Event:
 class Series:
     """One quantity at one pressure: measurements by progress ζ, and which event each came from.
 
-    `scale` leads from cycles since new to ζ and back; an adopted model's course is off the measurements. A slope is one at
-    `speed_rpm`, the lag of a loop one at `frequency_hz`. `draws` are the measurements under each draw of the model in force,
-    by weight, where it has any: the clutch is tracked under each, and `measurements` are their mean. `new_levels` are the
-    cycles since new of its tests that begin one without an event.
+    `scale` leads from cycles since new to ζ and back; the course of the model in force is off the measurements. A slope is
+    one at `speed_rpm`, the lag of a loop one at `frequency_hz`. `draws` are the measurements under each draw of the model
+    in force, by weight, where it has any: the clutch is tracked under each, and `measurements` are their mean. `new_levels`
+    are the cycles since new of its tests that begin one without an event.
     """
 
     quantity: str
@@ -124,6 +125,7 @@ class Series:
     measurements: tuple[Measurement, ...]
     events: tuple[int, ...]
     scale: Scale
+    assumptions: Assumptions
     speed_rpm: float | None = None
     frequency_hz: float | None = None
     draws: tuple[tuple[float, tuple[Measurement, ...]], ...] = ()
@@ -138,11 +140,15 @@ class Series:
         """How many measurements there were when `event` had happened."""
         return sum(1 for index in self.events if index <= event)
 
-    def as_measured(self, assumptions: Assumptions, index: int) -> tuple[float, Value]:
+    def priors(self, first: Measurement) -> Mapping[str, Prior]:
+        """The priors that it is tracked under where `first` is its first measurement, by name."""
+        return self.assumptions.priors(self.quantity, first, self.scale)
+
+    def as_measured(self, index: int) -> tuple[float, Value]:
         """Cycles since new, and value with deviation, of a measurement; the course of the model in force is put back on."""
         measurement = self.measurements[index]
         cycles = float(self.scale.cycles(measurement.progress))
-        added = float(assumptions.offset(self.quantity, self.pressure, np.array([cycles]))[0])
+        added = float(self.assumptions.offset(self.quantity, self.pressure, np.array([cycles]))[0])
         return cycles, (measurement.value + added, measurement.variance**0.5)
 
 
@@ -280,6 +286,7 @@ class Life:
             ),
             events=tuple(index for index, _ in measured),
             scale=scale,
+            assumptions=assumptions,
             new_levels=tuple(self._unexplained([self.events[index] for index, _ in measured])),
         )
 

@@ -47,12 +47,12 @@ def not_eq_6(courses: Sequence[CourseShare]) -> list[Notice]:
     return [Notice(code="not_eq6", message=message)]
 
 
-def new_extrapolated(series: Series, assumptions: Assumptions, late: NewLater | None, fraction: float) -> list[Notice]:
+def new_extrapolated(series: Series, late: NewLater | None, fraction: float) -> list[Notice]:
     """The warning of a clutch that has come more than half of the way to its end before its first test, as tracked: what it
     was when new then decides, and no test has seen it. A bench's counter that began with another clutch looks the same."""
     if late is None:
         return []
-    (cycles, (first, _)), initial = series.as_measured(assumptions, 0), late.extrapolated
+    (cycles, (first, _)), initial = series.as_measured(0), late.extrapolated
     if (share_of_way(first, initial, fraction * initial) or 0.0) >= 0.5:
         return []
     message = (

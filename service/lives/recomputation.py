@@ -261,7 +261,7 @@ def track(state: ClutchState, *, newest: history.Event | None = None) -> Trackin
     warnings: dict[str, list[dict[str, str]]] = {}
     for life, full_life, start, first_event in walks:
         measured = set(full_life.events)
-        walk = follow(life, full_life, assumptions, state.fraction, start, first_event=first_event)
+        walk = follow(life, full_life, state.fraction, start, first_event=first_event)
         for index, (after_event, after_test) in enumerate(walk, start=first_event):
             filters = after_event
             predictions |= {(prediction.cycles, prediction.method): prediction for prediction in after_test}

@@ -91,7 +91,7 @@ States = Mapping[str, Tracked]
 
 
 def follow(
-    life: Life, whole_series: Series, assumptions: Assumptions, fraction: float, states: States, *, first_event: int = 0
+    life: Life, whole_series: Series, fraction: float, states: States, *, first_event: int = 0
 ) -> Iterator[tuple[States, list[Prediction]]]:
     """Walk a life's events from `first_event` on; after each, the states by method and the predictions of the series.
 
@@ -100,38 +100,34 @@ def follow(
     """
     for index in range(first_event, len(life.events)):
         so_far, cycles = life.until(index), life.events[index].cycles
-        series = whole_series if assumptions.counts_cycles else so_far.pooled(assumptions)
+        series = whole_series
+        if not series.assumptions.counts_cycles:
+            series = so_far.pooled(series.assumptions)
         runs, tests = series.until(index), so_far.tests
         if runs:
-            states = {method: advance(method, series, assumptions, states.get(method), runs) for method in CARRIED}
+            states = {method: advance(method, series, states.get(method), runs) for method in CARRIED}
         predictions = []
         for method in CARRIED:
-            payload = predict(method, series, assumptions, states.get(method), cycles, fraction, tests=tests)
+            payload = predict(method, series, states.get(method), cycles, fraction, tests=tests)
             predictions.append(Prediction(cycles=cycles, method=method, payload=payloads.ended(payload, so_far.end)))
         yield states, predictions
 
 
 def advance(
-    method: str,
-    series: Series,
-    assumptions: Assumptions,
-    tracked: Tracked | None,
-    runs: int,
-    *,
-    back_cast: BackCast | None = None,
+    method: str, series: Series, tracked: Tracked | None, runs: int, *, back_cast: BackCast | None = None
 ) -> Tracked:
     """Carry one filter on until it has taken in the first `runs` measurements of the series.
 
     A `back_cast` that is known from another filter takes the place of its own. States that were made of other measurements
     or under other priors are not carried on: then the filter starts again.
     """
-    branches = _branches(series, assumptions)
+    branches = _branches(series)
     if tracked is not None and not _continues(tracked, branches):
         tracked = None
     if tracked is not None and tracked.runs == runs:
         return tracked
     tracker = _tracker(method, len(branches))
-    weak_prior = assumptions.priors(series.quantity, series.measurements[0], series.scale)[WEAK]
+    weak_prior = series.priors(series.measurements[0])[WEAK]
     if tracked is None:
         start = {name: tracker.start(prior) for name, (prior, _) in branches.items()}
         tracked = Tracked(runs=0, states=start, back_cast=BackCast.nothing())
@@ -144,18 +140,18 @@ def advance(
         judged = tracked.back_cast.judged(measurement) if back_cast is None else back_cast
         tracked = Tracked(runs=step + 1, states=states, back_cast=judged)
         if back_cast is None and kept_after(step + 1):
-            sample = drawn(method, series, assumptions, tracked)
+            sample = drawn(method, series, tracked)
             forecast = tracked.back_cast.forecast(sample, measurement, weak_prior)
             tracked = replace(tracked, back_cast=forecast, sample=sample)
     return tracked
 
 
-def _branches(series: Series, assumptions: Assumptions) -> dict[str, tuple[Prior, tuple[Measurement, ...]]]:
+def _branches(series: Series) -> dict[str, tuple[Prior, tuple[Measurement, ...]]]:
     """What a filter is run under, by name: every prior, with every draw of the series' measurements."""
     return {
         _branch(prior_name, draw, series): (prior, measurements)
         for draw, (_, measurements) in enumerate(series.weighted)
-        for prior_name, prior in assumptions.priors(series.quantity, measurements[0], series.scale).items()
+        for prior_name, prior in series.priors(measurements[0]).items()
     }
 
 
@@ -189,7 +185,7 @@ def _continues(tracked: Tracked, branches: Mapping[str, tuple[Prior, tuple[Measu
     return True
 
 
-def drawn(method: str, series: Series, assumptions: Assumptions, tracked: Tracked) -> Posterior:
+def drawn(method: str, series: Series, tracked: Tracked) -> Posterior:
     """A weighted sample of the coefficients after `tracked.runs` measurements; the same each time, and drawn once.
 
     Its size is shared among the priors and the draws of the model in force: so a prediction costs about the same.
@@ -200,11 +196,11 @@ def drawn(method: str, series: Series, assumptions: Assumptions, tracked: Tracke
     parts = []
     for draw, (weight, measurements) in enumerate(series.weighted):
         posteriors = {}
-        for prior in assumptions.priors(series.quantity, measurements[0], series.scale):
+        for prior in series.priors(measurements[0]):
             name = _branch(prior, draw, series)
             rng = step_rng(f"{_purpose(method, name)}-posterior", series, tracked.runs)
             posteriors[prior] = tracker.posterior(tracked.states[name], size, rng)
-        parts.append((weight, assumptions.pooled(posteriors, measurements[0], series.scale)))
+        parts.append((weight, series.assumptions.pooled(posteriors, measurements[0], series.scale)))
     return mixture(parts) if series.draws else parts[0][1]
 
 
@@ -219,43 +215,36 @@ def step_rng(purpose: str, series: Series, step: int) -> np.random.Generator:
 
 
 def predict(
-    method: str,
-    series: Series,
-    assumptions: Assumptions,
-    tracked: Tracked | None,
-    cycles: float,
-    fraction: float,
-    *,
-    tests: int,
+    method: str, series: Series, tracked: Tracked | None, cycles: float, fraction: float, *, tests: int
 ) -> dict[str, Any]:
     """The prediction at `cycles` of a series, in the public shape; the life has so many `tests`.
 
     With too few of them only the last and the safe bound are stated.
     """
-    answer = payloads.insufficient(assumptions, cycles, series.pressure, fraction)
+    answer = payloads.insufficient(series.assumptions, cycles, series.pressure, fraction)
     if tracked is None:
         return answer
     runs, scale = tracked.runs, series.scale
-    sample = drawn(method, series, assumptions, tracked)
+    sample = drawn(method, series, tracked)
     horizon_cycles = horizon_at(cycles - scale.origin)
     horizon = float(scale.progress(scale.origin + horizon_cycles))
-    end = end_of_life(sample, series, assumptions, tracked, cycles, fraction, horizon)
+    end = end_of_life(sample, series, tracked, cycles, fraction, horizon)
     passage = predict_first_passage(
         sample,
         fraction=fraction,
         as_of=float(scale.progress(cycles)),
         horizon=horizon,
-        offset=offset_of(series, assumptions),
+        offset=offset_of(series),
         stated=(end.ends, end.weight),
         initial=None if end.late is None else end.late.initial,
     )
     ends = {q: None if zeta is None else float(scale.cycles(zeta)) for q, zeta in passage.end_of_life.items()}
-    measured_at, (value, sd) = series.as_measured(assumptions, runs - 1)
+    measured_at, (value, sd) = series.as_measured(runs - 1)
     measured = {"mean_cof": value, "mean_cof_sd": sd, "measured_at_cycles": whole(round(measured_at, 3))}
     notices = [
         *payloads.left_out(tests, runs),
         *payloads.new_level([at for at in series.new_levels if at <= cycles]),
-        *_off_track(sample, series, assumptions, runs),
+        *_off_track(sample, series, runs),
     ]
     answer |= {
         "runs_used": runs,
@@ -269,7 +258,7 @@ def predict(
     courses, back_cast = course_shares(sample), tracked.back_cast
     notices += [
         *payloads.not_eq_6(courses),
-        *payloads.new_extrapolated(series, assumptions, end.late, fraction),
+        *payloads.new_extrapolated(series, end.late, fraction),
         *payloads.missed(back_cast),
     ]
     course, *alternatives = (
@@ -296,11 +285,11 @@ def predict(
     }
 
 
-def _off_track(sample: Posterior, series: Series, assumptions: Assumptions, runs: int) -> list[Notice]:
+def _off_track(sample: Posterior, series: Series, runs: int) -> list[Notice]:
     """The warning of a last test that lies far off under every draw of the model in force, by the first of them."""
     first: list[Notice] = []
     for draw, (_, measurements) in enumerate(series.weighted):
-        prior = assumptions.priors(series.quantity, measurements[0], series.scale)[WEAK]
+        prior = series.priors(measurements[0])[WEAK]
         notices = payloads.off_track(sample.of_branch(draw), measurements[:runs], prior)
         if not notices:
             return []
@@ -309,13 +298,7 @@ def _off_track(sample: Posterior, series: Series, assumptions: Assumptions, runs
 
 
 def end_of_life(
-    sample: Posterior,
-    series: Series,
-    assumptions: Assumptions,
-    tracked: Tracked,
-    cycles: float,
-    fraction: float,
-    horizon: float,
+    sample: Posterior, series: Series, tracked: Tracked, cycles: float, fraction: float, horizon: float
 ) -> StatedEnd:
     """The end of life ζ as it is stated at `cycles`, up to a horizon in ζ."""
     as_of = float(series.scale.progress(cycles))
@@ -324,25 +307,26 @@ def end_of_life(
         fraction=fraction,
         as_of=as_of,
         horizon=max(horizon, as_of),
-        offset=offset_of(series, assumptions),
+        offset=offset_of(series),
         power=tracked.back_cast.widening,
-        ended=assumptions.ended((series.quantity, series.pressure), fraction, series.scale),
+        ended=series.assumptions.ended((series.quantity, series.pressure), fraction, series.scale),
         tests=series.measurements[: tracked.runs],
     )
 
 
-def offset_of(series: Series, assumptions: Assumptions) -> Offset | None:
+def offset_of(series: Series) -> Offset | None:
     """The course of the model in force over ζ, None where there is none."""
-    if assumptions.model.course is None:
+    if series.assumptions.model.course is None:
         return None
-    return lambda progress: assumptions.offsets(series.quantity, series.pressure, series.scale.cycles(progress))
+    return lambda progress: series.assumptions.offsets(series.quantity, series.pressure, series.scale.cycles(progress))
 
 
-def mean_offset_of(series: Series, assumptions: Assumptions) -> Offset | None:
+def mean_offset_of(series: Series) -> Offset | None:
     """The mean of that over the model's draws [1, k]."""
+    quantity, pressure, assumptions = series.quantity, series.pressure, series.assumptions
     if assumptions.model.course is None:
         return None
-    return lambda progress: assumptions.offset(series.quantity, series.pressure, series.scale.cycles(progress))[None]
+    return lambda progress: assumptions.offset(quantity, pressure, series.scale.cycles(progress))[None]
 
 
 def predict_at(
@@ -371,8 +355,8 @@ def predict_at(
     series = life.pooled(assumptions) if pressure_bar is None else life.at(assumptions, level)
     if not series.measurements:
         return payloads.ended(payloads.insufficient(assumptions, cycles, level, fraction), life.end)
-    tracked = advance(method, series, assumptions, carried, len(series.measurements), back_cast=back_cast)
-    return payloads.ended(predict(method, series, assumptions, tracked, cycles, fraction, tests=life.tests), life.end)
+    tracked = advance(method, series, carried, len(series.measurements), back_cast=back_cast)
+    return payloads.ended(predict(method, series, tracked, cycles, fraction, tests=life.tests), life.end)
 
 
 def _level(life: Life | None, pressure_bar: float) -> float:

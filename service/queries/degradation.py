@@ -13,7 +13,7 @@ from models.prognosis.first_passage import paths as track_paths
 from models.prognosis.from_parameters import CofPaths, disagreement, far_apart, mean_cof_paths
 from service import records, stored_runs
 from service.errors import Notice
-from service.lives.assumptions import ALL_PRESSURES, Assumptions
+from service.lives.assumptions import ALL_PRESSURES
 from service.lives.condition import held_runs_left_out
 from service.lives.criteria import SEVERITY_EXPONENTS
 from service.lives.history import Series, reference_velocities
@@ -110,14 +110,14 @@ def _all_tracks(
     measured: MeasuredLife, method: str, draws: int, until: float | None
 ) -> tuple[list[dict[str, Any]], dict[str, Any] | None]:
     """Mean COF, every parameter, and mean COF from the parameters."""
-    direct = _tracked(measured, measured.series(_MEAN_COF), method)
+    direct = _tracked(measured.series(_MEAN_COF), method)
     tracks = parameter_tracks(measured.life, measured.assumptions, measured.tests, method)
     from_parameters = _from_parameters(
         measured, tracks, {series.pressure: (series, posterior) for series, posterior in direct}
     )
     named = {quantity.internal: quantity for quantity in QUANTITIES.values()}
     items = [
-        track_item(named[series.quantity], series, posterior, measured.assumptions, draws, until)
+        track_item(named[series.quantity], series, posterior, draws, until)
         for series, posterior in (*direct, *tracks.values())
     ]
     return items, from_parameters
@@ -130,8 +130,8 @@ def _items(
     if quantity.family is Family.SLOPE:
         return _slopes(measured, quantity, method, until)
     return [
-        track_item(quantity, series, posterior, measured.assumptions, draws, until)
-        for series, posterior in _tracked(measured, measured.series(quantity), method)
+        track_item(quantity, series, posterior, draws, until)
+        for series, posterior in _tracked(measured.series(quantity), method)
     ]
 
 
@@ -140,8 +140,7 @@ def _slopes(measured: MeasuredLife, quantity: Quantity, method: str, until: floa
     slopes = measured.series(quantity)
     tracks = parameter_tracks(measured.life, measured.assumptions, measured.tests, method)
     direct = {
-        series.pressure: (series, posterior)
-        for series, posterior in _tracked(measured, measured.mean_cofs().values(), method)
+        series.pressure: (series, posterior) for series, posterior in _tracked(measured.mean_cofs().values(), method)
     }
     items = []
     for series in slopes:
@@ -151,8 +150,8 @@ def _slopes(measured: MeasuredLife, quantity: Quantity, method: str, until: floa
     return items
 
 
-def _tracked(measured: MeasuredLife, several: Iterable[Series], method: str) -> list[Track]:
-    return [(series, posterior_of(series, measured.assumptions, method)) for series in several if series.measurements]
+def _tracked(several: Iterable[Series], method: str) -> list[Track]:
+    return [(series, posterior_of(series, method)) for series in several if series.measurements]
 
 
 def rows(payload: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
@@ -189,7 +188,7 @@ def _from_parameters(
         reference_cofs=[cof for cof, _ in life.reference.values()],
         rng=step_rng("rebuilt", series, len(series.measurements)),
     )
-    return None if paths is None else _payload(paths, direct[ALL_PRESSURES], measured.assumptions, measured.fraction)
+    return None if paths is None else _payload(paths, direct[ALL_PRESSURES], measured.fraction)
 
 
 def _severity_item(estimate: SeverityEstimate | None) -> dict[str, Any] | None:
@@ -219,7 +218,7 @@ def _disagreements(payload: Mapping[str, Any] | None) -> list[Notice]:
     ]
 
 
-def _payload(paths: CofPaths, direct: Track, assumptions: Assumptions, fraction: float) -> dict[str, Any]:
+def _payload(paths: CofPaths, direct: Track, fraction: float) -> dict[str, Any]:
     """The paths of mean COF in the public shape, beside the direct track."""
     series, posterior = direct
     now = float(paths.progress[paths.now])
@@ -227,7 +226,7 @@ def _payload(paths: CofPaths, direct: Track, assumptions: Assumptions, fraction:
     shown = paths.progress <= max(1.0, now) * 1.5
     cap = float(series.scale.cycles(paths.progress[-1]))
     quantiles = np.quantile(np.minimum(ends, 10 * cap), QUANTILES).tolist()
-    offset, horizon = offset_of(series, assumptions), float(paths.progress[-1])
+    offset, horizon = offset_of(series), float(paths.progress[-1])
     differences = disagreement(
         paths.present,
         ends,

@@ -90,10 +90,10 @@ def _prediction(state: ClutchState, method: str, planned: ProgrammeIn) -> dict[s
         return recent | {"recent_duty_cycles": by_quantile({})} | unknown
     life, runs = state.lives[-1], len(series.measurements)
     now = life.events[-1].cycles
-    tracked = advance(method, series, assumptions, (state.filters or {}).get(method), runs)
-    sample = drawn(method, series, assumptions, tracked)
+    tracked = advance(method, series, (state.filters or {}).get(method), runs)
+    sample = drawn(method, series, tracked)
     tracked = replace(tracked, sample=sample)
-    recent = ended(predict(method, series, assumptions, tracked, now, fraction, tests=life.tests), life.end)
+    recent = ended(predict(method, series, tracked, now, fraction, tests=life.tests), life.end)
     recent["recent_duty_cycles"] = recent["remaining_cycles"]
     if recent["status"] in (INSUFFICIENT, ENDED):
         return recent | unknown
@@ -102,7 +102,7 @@ def _prediction(state: ClutchState, method: str, planned: ProgrammeIn) -> dict[s
     programme = duty.programme(planned.programme, recent["current"]["mean_cof"], rng)
     most = series.scale.origin + horizon_at(now - series.scale.origin) - now
     horizon = float(series.scale.progress(now)) + most * float(programme.rates.max())
-    end = end_of_life(sample, series, assumptions, tracked, now, fraction, horizon)
+    end = end_of_life(sample, series, tracked, now, fraction, horizon)
     answer = _planned_answer(programme, end, series, now=now, most=most)
     if recent["status"] != PassageStatus.REACHED:
         open_ended = None in answer["remaining_cycles"].values()

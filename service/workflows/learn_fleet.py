@@ -225,7 +225,7 @@ def _lesson(life: Life, assumptions: Assumptions, fraction: float) -> Lesson | N
     if len(measurements) < FEWEST_TESTS_TO_LEARN:
         return None
     lesson = taught([replace(measurement, progress=measurement.progress * unit) for measurement in measurements])
-    offset = mean_offset_of(series, assumptions)
+    offset = mean_offset_of(series)
     progress = np.array([measurement.progress for measurement in measurements])
     values = np.array([measurement.value for measurement in measurements])
     initial, laws = new_and_laws(measurements)

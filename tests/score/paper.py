@@ -147,7 +147,7 @@ def lag(count: int, seed: int) -> str:
             for stage in STAGES:
                 measured = until(whole, stage * end)
                 series = next(s for s in measured.series(QUANTITIES[name]) if abs(s.pressure - _PRESSURE) < 1.0)
-                posterior = posterior_of(series, measured.assumptions)
+                posterior = posterior_of(series)
                 place = series.measurements[-1].progress
                 low, high = weighted_quantiles(
                     posterior.values(np.array([place]))[0], posterior.weight, (0.05, 0.95)

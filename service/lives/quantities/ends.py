@@ -56,7 +56,7 @@ def criterion_end(measured: MeasuredLife, criterion: CriterionIn, method: str) -
     if series is None:
         return CriterionEnd(criterion=criterion, tests=0)
     count = len(series.measurements)
-    _, last = series.as_measured(measured.assumptions, count - 1)
+    _, last = series.as_measured(count - 1)
     too_few = CriterionEnd(criterion=criterion, tests=count, current=last)
     if len({measurement.progress for measurement in series.measurements}) < FEWEST_TESTS:
         return too_few
@@ -110,24 +110,21 @@ def _mean_cof(
     measured: MeasuredLife, series: Series, fraction: float, method: str, at: FloatArray, horizon: float
 ) -> tuple[Sample, Sample]:
     """The end by a share of mean COF as `/remaining-useful-life` states it, and mean COF [2, n] at progress `at` [2]."""
-    assumptions, cycles = measured.assumptions, measured.life.events[-1].cycles
-    carried = measured.filters.get(method)
-    tracked = advance(method, series, assumptions, carried, len(series.measurements))
-    sample = drawn(method, series, assumptions, tracked)
-    end = end_of_life(sample, series, assumptions, tracked, cycles, fraction, horizon)
-    values = np.maximum(track_paths(sample, at, offset_of(series, assumptions)), 0.0)
+    tracked = advance(method, series, measured.filters.get(method), len(series.measurements))
+    sample = drawn(method, series, tracked)
+    end = end_of_life(sample, series, tracked, measured.life.events[-1].cycles, fraction, horizon)
+    values = np.maximum(track_paths(sample, at, offset_of(series)), 0.0)
     return (end.ends, end.weight), (values, sample.weight)
 
 
 def _paths(measured: MeasuredLife, quantity: Quantity, series: Series, progress: FloatArray) -> Sample | None:
     """The quantity at progress [k] in every draw [k, n], with the draws' weights [n]; None with too few tests."""
-    assumptions = measured.assumptions
     if quantity.family is not Family.SLOPE:
-        posterior = posterior_of(series, assumptions)
-        return track_paths(posterior, progress, offset_of(series, assumptions)), posterior.weight
-    tracks = parameter_tracks(measured.life, assumptions, measured.tests, pressures={series.pressure})
+        posterior = posterior_of(series)
+        return track_paths(posterior, progress, offset_of(series)), posterior.weight
+    tracks = parameter_tracks(measured.life, measured.assumptions, measured.tests, pressures={series.pressure})
     cof = measured.mean_cofs()[series.pressure]
-    direct = cof, posterior_of(cof, assumptions)
+    direct = cof, posterior_of(cof)
     paths = slopes_along(measured, tracks, direct, series.speed_rpm or 0.0, progress)
     return None if paths is None else (paths, np.full(paths.shape[1], 1.0 / paths.shape[1]))
 

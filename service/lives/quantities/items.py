@@ -12,7 +12,6 @@ from models.tracking.courses import Course
 from models.tracking.posterior import Posterior
 from models.tracking.sampling import thinned
 from service.columns import whole
-from service.lives.assumptions import Assumptions
 from service.lives.history import Series
 from service.lives.quantities.measured import Quantity, place_of
 
@@ -32,19 +31,14 @@ def trajectory_cycles(series: Series, until: float | None) -> FloatArray:
 
 
 def track_item(
-    quantity: Quantity,
-    series: Series,
-    posterior: Posterior,
-    assumptions: Assumptions,
-    draws: int = 0,
-    until: float | None = None,
+    quantity: Quantity, series: Series, posterior: Posterior, draws: int = 0, until: float | None = None
 ) -> dict[str, Any]:
     """A quantity that has a track of its own; the course of the model in force is put back on. `draws` > 0: with so many
     joint draws of the coefficients. With too few tests there is only what was measured."""
     if len({measurement.progress for measurement in series.measurements}) < FEWEST_TESTS:
-        return paths_item(quantity, series, None, assumptions)
+        return paths_item(quantity, series, None)
     cycles = trajectory_cycles(series, until)
-    course = assumptions.offsets(series.quantity, series.pressure, cycles)
+    course = series.assumptions.offsets(series.quantity, series.pressure, cycles)
     values = posterior.values(series.scale.progress(cycles)) + posterior.beside(course)
     band = np.array([weighted_quantiles(row, posterior.weight, BAND) for row in values])
     home = np.flatnonzero(posterior.course == Course.EQ_6)
@@ -57,33 +51,24 @@ def track_item(
         if draws:  # of equal weight, a row of the columns a draw
             samples = _samples(thinned(following, draws, 0.5))
             coefficients["draws"] = {name: own.tolist() for name, own in zip(COEFFICIENTS, samples, strict=True)}
-    return _item(quantity, series, assumptions, coefficients, cycles, band)
+    return _item(quantity, series, coefficients, cycles, band)
 
 
 def paths_item(
-    quantity: Quantity,
-    series: Series,
-    paths: FloatArray | None,
-    assumptions: Assumptions | None = None,
-    until: float | None = None,
+    quantity: Quantity, series: Series, paths: FloatArray | None, until: float | None = None
 ) -> dict[str, Any]:
     """A quantity that follows from others' tracks, whose `paths` [k, n] over `trajectory_cycles` are equal draws (None: too
-    few tests): it has no coefficients of its own. `assumptions` where the model in force has a course of it."""
+    few tests): it has no coefficients of its own."""
     band = np.zeros((0, len(BAND))) if paths is None else np.quantile(paths, BAND, axis=1).T
     cycles = trajectory_cycles(series, until)[: band.shape[0]]
-    return _item(quantity, series, assumptions or Assumptions(), dict.fromkeys(_OF_EQ_6), cycles, band)
+    return _item(quantity, series, dict.fromkeys(_OF_EQ_6), cycles, band)
 
 
 def _item(
-    quantity: Quantity,
-    series: Series,
-    assumptions: Assumptions,
-    coefficients: Mapping[str, Any],
-    cycles: FloatArray,
-    band: FloatArray,
+    quantity: Quantity, series: Series, coefficients: Mapping[str, Any], cycles: FloatArray, band: FloatArray
 ) -> dict[str, Any]:
     tested = series.scale.cycles(np.array([measurement.progress for measurement in series.measurements]))
-    off = assumptions.offset(series.quantity, series.pressure, tested)
+    off = series.assumptions.offset(series.quantity, series.pressure, tested)
     measured = zip(series.measurements, off.tolist(), strict=True)
     lower, median, upper = band.T.tolist()
     head = {"quantity": quantity.name, "unit": quantity.unit} | place_of(series)

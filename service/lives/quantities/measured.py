@@ -159,21 +159,20 @@ _NODES, _ROWS, _LEVELS = TRAJECTORY_LATTICE
 _GRID = Grid(nodes=_NODES, rows=_ROWS, levels=_LEVELS)
 
 
-def posterior_of(series: Series, assumptions: Assumptions, method: str = _GRID.name) -> Posterior:
+def posterior_of(series: Series, method: str = _GRID.name) -> Posterior:
     """A weighted sample of a series' eq. 6, the same each time; by the exact filter on a lattice fit for plots, else by the
     filter of that name taken through all measurements."""
     if method != _GRID.name:
         runs = len(series.measurements)
-        tracked = advance(method, series, assumptions, None, runs, back_cast=BackCast.nothing())
-        return drawn(method, series, assumptions, tracked)
+        return drawn(method, series, advance(method, series, None, runs, back_cast=BackCast.nothing()))
     parts = []
     for weight, measurements in series.weighted:
         posteriors = {}
-        for name, prior in assumptions.priors(series.quantity, measurements[0], series.scale).items():
+        for name, prior in series.priors(measurements[0]).items():
             state = _GRID.from_history(prior, measurements)
             rng = step_rng(f"trajectory-{name}", series, len(measurements))
             posteriors[name] = _GRID.posterior(state, math.ceil(TRAJECTORY_DRAWS / len(series.weighted)), rng)
-        parts.append((weight, assumptions.pooled(posteriors, measurements[0], series.scale)))
+        parts.append((weight, series.assumptions.pooled(posteriors, measurements[0], series.scale)))
     return parts[0][1] if len(parts) == 1 else mixture(parts)
 
 
@@ -210,7 +209,7 @@ def parameter_tracks(
 ) -> dict[tuple[str, float], Track]:
     """The eq. 6 of Stribeck parameters at every reference pressure where they are known, by name and pressure [Pa]."""
     return {
-        (name, series.pressure): (series, posterior_of(series, assumptions, method))
+        (name, series.pressure): (series, posterior_of(series, method))
         for name in PARAMETER_NAMES
         for series in parameter_series(life, assumptions, tests, name)
         if series.measurements and (pressures is None or series.pressure in pressures)

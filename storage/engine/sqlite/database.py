@@ -37,7 +37,7 @@ def _fault_of_file(path: Path, journal_mode: str) -> str | None:
             (revision,) = connection.execute("SELECT version_num FROM alembic_version").fetchone()
     except sqlite3.Error as error:
         busy = getattr(error, "sqlite_errorcode", 0) & 0xFF == sqlite3.SQLITE_BUSY
-        if journal_mode == connect.JOURNAL_MODE or not busy:
+        if journal_mode == "wal" or not busy:
             return f"the file cannot be read: {error}"
     else:
         if revision != head():

@@ -49,9 +49,9 @@ def test_two_priors_share_particles_and_draws(method: str) -> None:
     sizes = {}
     for name, assumptions in (("alone", Assumptions()), ("taught", Assumptions(prior=LearnedPrior(fleet=FLEET_PRIOR)))):
         series = life.pooled(assumptions)
-        tracked = advance(method, series, assumptions, None, 3)
+        tracked = advance(method, series, None, 3)
         assert tracked.states.keys() == ({WEAK} if name == "alone" else {WEAK, FLEET})
-        assert drawn(method, series, assumptions, tracked).weight.size == PREDICTION_DRAWS
+        assert drawn(method, series, tracked).weight.size == PREDICTION_DRAWS
         clouds = {key: state.cloud for key, state in tracked.states.items() if hasattr(state, "cloud")}
         sizes[name] = {key: cloud.log_weight.size for key, cloud in clouds.items()}
     if method == "particle":
@@ -84,9 +84,9 @@ def assumptions(*weights: float) -> Assumptions:
 
 def ends(method: str, of: Life, under: Assumptions) -> tuple[np.ndarray, np.ndarray]:
     series = of.pooled(under)
-    tracked = advance(method, series, under, None, len(series.measurements))
-    sample = drawn(method, series, under, tracked)
-    stated = end_of_life(sample, series, under, tracked, CYCLES[-1], 0.5, 1e6)
+    tracked = advance(method, series, None, len(series.measurements))
+    sample = drawn(method, series, tracked)
+    stated = end_of_life(sample, series, tracked, CYCLES[-1], 0.5, 1e6)
     return stated.ends, stated.weight
 
 
@@ -108,11 +108,11 @@ def test_a_filter_that_is_carried_on_says_what_one_that_starts_again_says(method
     series = of.pooled(under)
     carried = None
     for runs in range(1, len(CYCLES) + 1):
-        carried = advance(method, series, under, carried, runs)
-    again = advance(method, series, under, None, len(CYCLES))
+        carried = advance(method, series, carried, runs)
+    again = advance(method, series, None, len(CYCLES))
     assert carried is not None
     assert set(carried.states) == {"weak@0", "weak@1"}
-    said = [predict(method, series, under, states, CYCLES[-1], 0.5, tests=of.tests) for states in (carried, again)]
+    said = [predict(method, series, states, CYCLES[-1], 0.5, tests=of.tests) for states in (carried, again)]
     assert said[0] == said[1]
 
 
@@ -132,8 +132,8 @@ def test_a_test_is_odd_only_where_it_is_under_every_draw() -> None:
     warned = []
     for one in (of, odd_under_one, both):
         series = one.pooled(under)
-        tracked = advance("particle", series, under, None, len(CYCLES))
-        said = predict("particle", series, under, tracked, CYCLES[-1], 0.5, tests=of.tests)
+        tracked = advance("particle", series, None, len(CYCLES))
+        said = predict("particle", series, tracked, CYCLES[-1], 0.5, tests=of.tests)
         warned.append("off_track" in {warning["code"] for warning in said["warnings"]})
     assert warned == [False, False, True]
 
@@ -160,9 +160,9 @@ def test_a_prediction_says_how_many_lives_it_draws_on_and_that_its_forecasts_mis
     for lives, misses in (((), [0.5] * 10), (tuple(ended), [0.5] * 2 + [2.0] * 8)):
         under = replace(assumptions(1.0), prior=LearnedPrior(ended=lives))
         series = of.pooled(under)
-        tracked = advance("particle", series, under, None, len(CYCLES))
+        tracked = advance("particle", series, None, len(CYCLES))
         tracked = replace(tracked, back_cast=replace(tracked.back_cast, misses=np.array(misses)))
-        said.append(predict("particle", series, under, tracked, CYCLES[-1], 0.5, tests=of.tests))
+        said.append(predict("particle", series, tracked, CYCLES[-1], 0.5, tests=of.tests))
     assert [answer["ended_lives"] for answer in said] == [0, 2]
     warned = [[w["message"] for w in answer["warnings"] if w["code"] == "missed_forecasts"] for answer in said]
     assert warned[0] == []
@@ -177,7 +177,7 @@ def test_a_level_and_the_curve_of_a_loop_have_the_unbiased_covariance() -> None:
     measured = measured_life(draw(rng), [0.0, 2_000.0, 4_000.0, 6_000.0], rng)
     pressure, cof = list(measured.mean_cofs().items())[PLACE]
     tracks = parameter_tracks(measured.life, measured.assumptions, measured.tests, pressures={pressure})
-    direct = cof, posterior_of(cof, measured.assumptions)
+    direct = cof, posterior_of(cof)
     level = pressure_level(measured, tracks, direct, pressure)
     fits = [levels[PLACE].fit for levels in measured.tests]
     np.testing.assert_array_equal(level.covariance, [fit.unbiased_covariance for fit in fits])
@@ -198,8 +198,9 @@ def test_coefficients_are_those_of_eq_6_and_say_how_probable_it_is(follows: bool
         measurements=tuple(measurements),
         events=tuple(range(len(measurements))),
         scale=Scale(origin=0.0),
+        assumptions=Assumptions(),
     )
-    item = track_item(QUANTITIES[MEAN_COF], series, posterior, Assumptions())
+    item = track_item(QUANTITIES[MEAN_COF], series, posterior)
     assert (item["eq6_probability"] > 0.5) is follows
     if item["coefficients"] is None:
         assert item["eq6_probability"] == 0.0
