@@ -10,8 +10,7 @@ from models.engagements.comparison import bin_means
 from models.engagements.discrepancy import Discrepancy, discrepancy
 from models.engagements.measured import MeasuredEngagement, trace_times
 from models.engagements.simulation import Capacity, Drive, Engagement, PressureProfile, capacity_of, engage
-from models.friction.stribeck import PARAMETER_NAMES, StribeckParameters
-from models.prognosis.first_passage import weighted_quantiles
+from models.friction.stribeck import StribeckParameters
 from service import records, stored_runs
 from service.columns import PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM, whole
 from service.errors import NotFoundError
@@ -20,7 +19,7 @@ from service.lives.condition import held_runs_left_out
 from service.lives.engagements import evaluated, public_channels
 from service.lives.history import Life, lives_of
 from service.lives.incoming_run import IncomingRun
-from service.lives.quantities.measured import Track, chosen_life, parameter_tracks, tests_of
+from service.lives.quantities.measured import chosen_life, parameter_medians
 from service.lives.run_analysis import LevelFit
 from storage.engine.database import Database
 
@@ -124,29 +123,14 @@ def _parameters(
     life: Life, assumptions: Assumptions, fits: Mapping[str, Sequence[LevelFit]], moments: Sequence[float]
 ) -> list[dict[float, StribeckParameters]]:
     """At each of several cycles since new, the parameters by pressure [Pa], each the median of its own track."""
-    tracks = parameter_tracks(life, assumptions, tests_of(life, fits))
-    known = dict.fromkeys(level for _, level in tracks)
-    levels = [level for level in known if all((name, level) in tracks for name in PARAMETER_NAMES)]
+    levels, medians = parameter_medians(life, assumptions, fits, np.array(moments))
     if not levels:
         raise NotFoundError(
             "no engagement can be simulated: no test up to these cycles determines all four Stribeck parameters. Send "
             "one over more speeds"
         )
-    return [
-        {
-            level: StribeckParameters(
-                **{name: max(_median(tracks[name, level], cycles), 0.0) for name in PARAMETER_NAMES}
-            )
-            for level in levels
-        }
-        for cycles in moments
-    ]
-
-
-def _median(track: Track, cycles: float) -> float:
-    series, posterior = track
-    values = posterior.values(np.array([float(series.scale.progress(cycles))]))[0]
-    return float(weighted_quantiles(values, posterior.weight, (0.5,))[0])
+    curves = np.maximum(medians, 0.0).T
+    return [dict(zip(levels, map(StribeckParameters.from_array, at), strict=True)) for at in curves]
 
 
 def _course(trace: Engagement, contact: float = 0.0) -> dict[str, list[float]]:

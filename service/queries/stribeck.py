@@ -12,7 +12,6 @@ from models.friction.criteria import FEWEST_PRESSURES
 from models.friction.pressure_laws import LinearLaw, PressureLaws, fit_pressure_laws, law_covariances, over_pressure
 from models.friction.stribeck import PARAMETER_NAMES, StribeckParameters, torque
 from models.prognosis.criteria import FEWEST_TESTS
-from models.prognosis.first_passage import weighted_quantiles
 from service import records
 from service.columns import PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM, bar, whole
 from service.errors import NotFoundError
@@ -21,7 +20,7 @@ from service.lives.assumptions import Assumptions
 from service.lives.condition import held_runs_left_out
 from service.lives.history import Event, lives_of
 from service.lives.payloads import PARAMETER_UNITS
-from service.lives.quantities.measured import Track, parameter_tracks, tests_of
+from service.lives.quantities.measured import parameter_medians
 from service.lives.run_analysis import LevelFit
 from storage import runs
 from storage.engine.database import Database
@@ -99,16 +98,14 @@ def surfaces(
     if speed_range is None:
         raise NotFoundError("there are no surfaces, because this life has no stationary test: send one")
     life = history[-1]
-    tracks = parameter_tracks(life, assumptions, tests_of(life, fits))
-    levels = sorted(level for level in life.reference if all((name, level) in tracks for name in PARAMETER_NAMES))
+    tested = np.unique([event.cycles for event in life.events if event.cofs])
+    enough = tested.size >= FEWEST_TESTS  # fewer say nothing of what lies between or behind them
+    cycles = np.linspace(life.origin, life.events[-1].cycles, CYCLES) if enough else tested
+    levels, tracked = parameter_medians(life, assumptions, fits, cycles)
     if not levels:
         raise NotFoundError(
             "there are no surfaces, because no test determines all four Stribeck parameters: send one over more speeds"
         )
-    tested = np.unique([event.cycles for event in life.events if event.cofs])
-    enough = tested.size >= FEWEST_TESTS  # fewer say nothing of what lies between or behind them
-    cycles = np.linspace(life.origin, life.events[-1].cycles, CYCLES) if enough else tested
-    tracked = np.array([[_medians(tracks[name, level], cycles) for level in levels] for name in PARAMETER_NAMES])
     pressures = np.array(levels)
     if len(levels) >= FEWEST_PRESSURES:
         pressures = np.linspace(levels[0], levels[-1], PRESSURES)
@@ -143,9 +140,3 @@ def surface_rows(grids: Mapping[str, Any]) -> list[dict[str, Any]]:
         for j, pressure in enumerate(grids["pressure_bar"])
         for k, speed in enumerate(grids["speed_rpm"])
     ]
-
-
-def _medians(track: Track, cycles: FloatArray) -> list[float]:
-    series, posterior = track
-    values = posterior.values(series.scale.progress(cycles))
-    return [float(weighted_quantiles(row, posterior.weight, (0.5,))[0]) for row in values]

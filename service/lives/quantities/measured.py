@@ -14,6 +14,7 @@ from models.friction.identification import cof_slope
 from models.friction.stribeck import PARAMETER_NAMES
 from models.prognosis.back_cast import BackCast
 from models.prognosis.criteria import FEWEST_TESTS
+from models.prognosis.first_passage import weighted_quantiles
 from models.prognosis.from_parameters import PressureLevel, slope_paths
 from models.tracking.filters.grid import Grid
 from models.tracking.posterior import Posterior, mixture
@@ -214,6 +215,22 @@ def parameter_tracks(
         for series in parameter_series(life, assumptions, tests, name)
         if series.measurements and (pressures is None or series.pressure in pressures)
     }
+
+
+def parameter_medians(
+    life: Life, assumptions: Assumptions, fits: Mapping[str, Sequence[LevelFit]], cycles: FloatArray
+) -> tuple[list[float], FloatArray]:
+    """The reference pressures [p] Pa at which all Stribeck parameters have tracks, ascending, and the medians [4, p, k] of
+    these at cycles since new [k]."""
+    tracks = parameter_tracks(life, assumptions, tests_of(life, fits))
+    levels = sorted(level for level in life.reference if all((name, level) in tracks for name in PARAMETER_NAMES))
+    medians = np.empty((len(PARAMETER_NAMES), len(levels), cycles.size))
+    for row, name in zip(medians, PARAMETER_NAMES, strict=True):
+        for column, level in zip(row, levels, strict=True):
+            series, posterior = tracks[name, level]
+            values = posterior.values(series.scale.progress(cycles))
+            column[:] = [weighted_quantiles(sample, posterior.weight, (0.5,))[0] for sample in values]
+    return levels, medians
 
 
 #: What a receipt's loop calls the quantities of the lag and their deviations.
