@@ -51,7 +51,7 @@ export function askRule(rule, clutchId) {
   const name = input("alarm-name", rule?.name ?? "");
   const clutch = input("alarm-clutch", rule ? (rule.clutch_id ?? "") : (clutchId ?? ""));
   const enabled = h("input", { id: "alarm-enabled", type: "checkbox", checked: rule?.enabled ?? true });
-  const limits = h("div", { class: "fields" });
+  const limits = h("div.fields");
   const watched = () => WATCHED[/** @type {Watched} */ (quantity.value)];
   const draw = () => {
     const { side, unit } = watched();
@@ -71,7 +71,7 @@ export function askRule(rule, clutchId) {
     limits,
     field(clutch, "Clutch (empty: all clutches)"),
     field(name, "Name (optional)"),
-    h("label", { class: "switch" }, enabled, "In use"),
+    h("label.switch", enabled, "In use"),
   ];
   const send = () => {
     const { side } = watched();
@@ -98,7 +98,7 @@ export function askReceiver(clutchId) {
   const url = h("input", { id: "receiver-url", type: "text", required: true, autocomplete: "off" });
   const name = input("receiver-name", "");
   const about = "https:// for a signed webhook; with the extra notify also mailtos://, msteams://, slack://, ntfys://";
-  const fields = [field(url, "Address", h("small", {}, about)), field(name, "Name (optional)")];
+  const fields = [field(url, "Address", h("small", about)), field(name, "Name (optional)")];
   const send = () => ({
     url: url.value.trim(),
     name: name.value.trim(),

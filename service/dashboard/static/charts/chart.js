@@ -55,26 +55,25 @@ export class Chart {
     this.stale = false;
     this.visible = false;
     this.turn = 0;
-    this.note = h("p", { class: "note" }, "Being computed …");
-    this.controls = h("div", { class: "controls" });
+    this.note = h("p.note", "Being computed …");
+    this.controls = h("div.row.controls");
     this.ask = button("Draw it (loads 1.4 MB once)", want, { class: "small", hidden: true });
     const style = { "min-height": `${height}px` };
     const watched = { onpointerenter: pointed, onclick: want };
-    this.plot = h("div", { class: "plot", role: "img", "aria-label": title, style, ...watched });
+    this.plot = h("div.plot", { role: "img", "aria-label": title, style, ...watched });
     this.table = scrolling(`${title}: table`);
-    this.details = h("details", { ontoggle: () => this.fill() }, h("summary", {}, "Table"), this.table);
+    this.details = h("details", { ontoggle: () => this.fill() }, h("summary", "Table"), this.table);
     this.tools = h(
-      "div",
-      { class: "tools" },
+      "div.tools",
       this.button("PNG", "save as PNG", () => this.savePng()),
       this.button("CSV", "save data as CSV", () => this.saveTable("csv")),
       this.button("XLSX", "save data as XLSX", () => this.saveTable("xlsx")),
     );
-    const heading = h("h3", {}, title, letter && [" ", symbol(...letter)]);
+    const heading = h("h3", title, letter && [" ", symbol(...letter)]);
     this.element = h(
       "figure",
       { class: `chart panel${wide ? " wide" : ""}`, id: `chart-${id}` },
-      h("figcaption", {}, heading, this.tools, this.note),
+      h("figcaption", heading, this.tools, this.note),
       this.controls,
       this.ask,
       this.plot,
@@ -100,7 +99,7 @@ export class Chart {
     if (nothing !== null) {
       this.ask.hidden = true;
       this.clear();
-      this.plot.replaceChildren(h("p", { class: "nothing" }, nothing));
+      this.plot.replaceChildren(h("p.nothing", nothing));
     } else if (this.plot.querySelector(".nothing")) this.plot.replaceChildren();
     this.plot.setAttribute("aria-label", `${this.title}. ${spec.note ?? ""} The numbers are in the table below.`);
     this.tools.hidden = this.details.hidden = !spec.rows?.length;
@@ -131,7 +130,7 @@ export class Chart {
       library = await plotly();
     } catch {
       this.stale = true; // tried again when the chart is next looked at
-      if (!this.plot.hasChildNodes()) this.plot.append(h("p", { class: "nothing" }, NO_LIBRARY));
+      if (!this.plot.hasChildNodes()) this.plot.append(h("p.nothing", NO_LIBRARY));
       return;
     }
     const figure = this.figure();
@@ -240,7 +239,28 @@ function cellText(value, { text }) {
  */
 export function choice(label, options, value, changed) {
   const list = select({ onchange: () => changed(options[list.selectedIndex][0]) }, options, value);
-  return h("label", {}, `${label} `, list);
+  return h("label", `${label} `, list);
+}
+
+/**
+ * Choices that are kept by name: what is chosen is noted, and `changed` draws it.
+ * @template {object} Chosen
+ * @param {Chosen} chosen
+ * @param {(name: keyof Chosen) => unknown} changed
+ */
+export function chooser(chosen, changed) {
+  /**
+   * @template {keyof Chosen} Name
+   * @param {Name} name
+   * @param {string} label
+   * @param {[NonNullable<Chosen[Name]> & (string | number), string][]} options
+   * @param {Chosen[Name]} value
+   */
+  return (name, label, options, value = chosen[name]) =>
+    choice(label, options, /** @type {any} */ (value), (now) => {
+      chosen[name] = now;
+      changed(name);
+    });
 }
 
 /** @type {(chart: { controls: HTMLElement }, controls: HTMLElement[]) => void} the focus stays where it was */

@@ -204,7 +204,6 @@ function key({ trace, x, y }, l, top, size) {
   const stroke = { ...strokeOf(line), "stroke-width": Math.min(10, line.width ?? 2) };
   return svg(
     "g",
-    {},
     band && svg("rect", { x: from, y: middle - 3, width: 30, height: 6, fill: trace.fillcolor }),
     !band &&
       trace.mode.includes("lines") &&

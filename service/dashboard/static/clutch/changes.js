@@ -48,9 +48,9 @@ export const isCorrected = (run) => run.cycles !== run.sent_cycles;
  * @param {Receipt} run
  */
 export function stateMark(run) {
-  if (run.state === "held") return h("span", { class: "mark-held" }, "Held");
-  if (run.state === "withdrawn") return h("span", { class: "mark-withdrawn" }, "Withdrawn");
-  return isCorrected(run) ? h("span", { class: "mark-corrected" }, `Sent as ${fixed(run.sent_cycles)}`) : "";
+  if (run.state === "held") return h("span.mark-held", "Held");
+  if (run.state === "withdrawn") return h("span.mark-withdrawn", "Withdrawn");
+  return isCorrected(run) ? h("span.mark-corrected", `Sent as ${fixed(run.sent_cycles)}`) : "";
 }
 
 /** @type {(run: Receipt) => RunAction[]} what can be done to a run now */
@@ -216,7 +216,7 @@ const QUESTIONS = {
  */
 export async function askRun(action, run) {
   const question = await QUESTIONS[action](run);
-  const name = h("p", {}, h("b", {}, named(run)), " · ", h("code", {}, run.run_id));
+  const name = h("p", h("b", named(run)), " · ", h("code", run.run_id));
   return ask({ ...question, lines: [name, ...question.lines] });
 }
 
@@ -238,7 +238,7 @@ export function askInspection({ clutch_id: clutch, inspection_id: id, cycles, st
   return ask({
     title: `${word} this inspection`,
     lines: [
-      h("p", {}, h("b", {}, `Inspection ${place}`)),
+      h("p", h("b", `Inspection ${place}`)),
       action === "withdraw"
         ? "It disappears from the charts and stays in the table. Nothing is deleted: you can restore it."
         : "It appears in the charts again, with its photographs.",
@@ -316,7 +316,7 @@ function ask({ title, lines, action, optional = false, cycles, choice, note, sen
   const chosen = h("select", { id: "chosen", required: true }, ...options);
   const closed = asked({
     title,
-    lines: lines.map((line) => (typeof line === "string" ? line && h("p", {}, line) : line)),
+    lines: lines.map((line) => (typeof line === "string" ? line && h("p", line) : line)),
     fields: [
       cycles === undefined ? null : field(number, "Duty cycles since new"),
       choice ? field(chosen, choice.label) : null,
@@ -337,7 +337,7 @@ export async function showDone(done, refresh) {
   if (done === null) return;
   shown?.remove();
   const { text, undo } = done;
-  const place = h("div", { class: "done", role: "status", tabindex: "-1" });
+  const place = h("div.row.done", { role: "status", tabindex: "-1" });
   const close = button("Close", () => place.remove());
   const goBack = async () => {
     try {
@@ -347,7 +347,7 @@ export async function showDone(done, refresh) {
     }
   };
   document.body.append(place);
-  place.append(h("p", {}, text), undo ? button("Undo", goBack) : "", close);
+  place.append(h("p", text), undo ? button("Undo", goBack) : "", close);
   shown = place;
   place.focus({ preventScroll: true });
   await refresh();

@@ -3,25 +3,26 @@
 // Open this file first, then head.js (the first lines), reader.js (what is read) and a tab: overview.js, curves.js, loops.js,
 // runs.js, history.js; changes.js says what may be changed, report.js makes the printed page.
 
-import { Diagnosis } from "../diagnosis/diagnosis.js";
-import { Alarms } from "../alarms/alarms.js";
+import { diagnosisTab } from "../diagnosis/diagnosis.js";
+import { alarms } from "../alarms/alarms.js";
 import { painted } from "../charts/plotting.js";
-import { Engagements } from "../engagements/engagements.js";
+import { engagementsTab } from "../engagements/engagements.js";
 import { sender } from "../sending/sending.js";
 import { Problem, read } from "../shared/api.js";
 import { button, byId, h, showTab, within } from "../shared/dom.js";
 import { Live } from "../shared/live.js";
 import { placeUnits } from "../shared/units.js";
 import { askArchive, askEnd, askTakeBack, showDone } from "./changes.js";
-import { Curves } from "./curves.js";
+import { curvesTab } from "./curves.js";
 import { head } from "./head.js";
-import { History } from "./history.js";
-import { Loops } from "./loops.js";
-import { Overview } from "./overview.js";
+import { historyTab } from "./history.js";
+import { loopsTab } from "./loops.js";
+import { overviewTab } from "./overview.js";
 import { Reader } from "./reader.js";
 import { makeReport } from "./report.js";
-import { Runs } from "./runs.js";
+import { runsTab } from "./runs.js";
 
+/** @import { Chart } from "../charts/chart.js" */
 /** @import { ClutchOut } from "../shared/types.js" */
 /** @import { Asked } from "./changes.js" */
 
@@ -31,6 +32,7 @@ import { Runs } from "./runs.js";
  * @typedef {object} Tab
  * @property {(item: string) => Promise<void>} show reads and draws; `item` is what the address opens in it
  * @property {() => Promise<void>} [poll] looks for what changes without the clutch
+ * @property {Chart[]} [charts] of the printed page
  */
 
 const INTERVAL = 2000; // ms
@@ -45,26 +47,16 @@ const page = { reader, done };
 
 /** @type {Record<string, (place: HTMLElement) => Tab>} */
 const TABS = {
-  overview: (place) => new Overview(place, page),
-  diagnosis: () => {
-    const diagnosis = new Diagnosis(within("diagnosis", ".body"), ID, reader.name, refresh);
-    const show = async () => {
-      diagnosis.setModel((await reader.life()).model);
-      await diagnosis.poll();
-    };
-    return { show: () => (reader.present().runs > 0 ? show() : diagnosis.poll()), poll: () => diagnosis.poll() };
-  },
-  curves: () => new Curves(page),
-  loops: () => new Loops(page),
-  engagements: () => {
-    const engagements = new Engagements(ID, reader.name, within("engagements", ".charts"));
-    return { show: async () => engagements.show(await reader.runs(), await reader.events()) };
-  },
-  runs: () => new Runs(within("runs", ".body"), page),
-  history: () => new History(page),
+  overview: (place) => overviewTab(place, page),
+  diagnosis: () => diagnosisTab(within("diagnosis", ".body"), reader, refresh),
+  curves: () => curvesTab(page),
+  loops: () => loopsTab(page),
+  engagements: () => engagementsTab(within("engagements", ".charts"), reader),
+  runs: () => runsTab(within("runs", ".body"), page),
+  history: () => historyTab(page),
   alarms: (place) => {
-    const alarms = new Alarms(place, ID);
-    return { show: () => alarms.show(), poll: () => alarms.show() };
+    const show = alarms(place, ID);
+    return { show, poll: show };
   },
 };
 
@@ -131,7 +123,7 @@ function drawHead(clutch) {
   painted().then(() => performance.mark("head-shown"));
   const back = button("Bring it back …", () => done(askArchive(ID, false)));
   const text = "This clutch is archived: it is not in the list of clutches and accepts no new runs.";
-  byId("archived").replaceChildren(clutch.archived ? h("div", { class: "notice" }, h("p", {}, text), back) : "");
+  byId("archived").replaceChildren(clutch.archived ? h("div.notice", h("p", text), back) : "");
   makeReport(byId("report"), { clutch });
 }
 
@@ -143,18 +135,15 @@ async function endOrTakeBack() {
 /** The printed page, made beside the overview whenever that is drawn. */
 async function drawReport() {
   const clutch = reader.present();
-  const overview = opened.get("overview");
-  if (clutch.runs === 0 || !(overview instanceof Overview)) return;
+  if (clutch.runs === 0) return;
   const [life, tests, events] = await Promise.all([reader.life(), reader.tests(), reader.events()]);
-  makeReport(byId("report"), { clutch, life, tests, events, charts: [overview.fan, overview.shudder] });
+  makeReport(byId("report"), { clutch, life, tests, events, charts: opened.get("overview")?.charts });
 }
 
 function showUnregistered() {
   const sentence = `No clutch is registered as “${ID}”. It appears here when it is registered. `;
   const link = h("a", { href: "/" }, "All clutches");
-  byId("head").replaceChildren(
-    h("div", { class: "notice bad" }, h("h1", {}, "No such clutch"), h("p", {}, sentence, link)),
-  );
+  byId("head").replaceChildren(h("div.notice.bad", h("h1", "No such clutch"), h("p", sentence, link)));
 }
 
 byId("print").addEventListener("click", async () => {

@@ -1,7 +1,7 @@
 // @ts-check
 // The tab of the Stribeck curves: curves by state or pressure, in 3D, and their four parameters over cycles and pressure.
 
-import { Chart, choice, setControls } from "../charts/chart.js";
+import { Chart, chooser, setControls } from "../charts/chart.js";
 import { landscape, parameter, PARAMETER_NAMES, PARAMETERS } from "../charts/parameters.js";
 import { flat, pressuresOf, spread, surface } from "../charts/stribeck.js";
 import { levelOptions, stateOptions, usual } from "../quantities/choices.js";
@@ -29,101 +29,70 @@ const DEPTHS = [
 /** @type {[ParameterName, string][]} */
 const NAMES = PARAMETER_NAMES.map((key) => [key, PARAMETERS[key].title]);
 
-export class Curves {
-  /** @param {Page} page */
-  constructor({ reader }) {
-    this.reader = reader;
-    const { name } = reader;
-    this.curves = new Chart({ name, id: "stribeck", title: "Stribeck curves", height: 440 });
-    this.surface = new Chart({ name, id: "surface", title: "Stribeck curves in 3D", spatial: true, height: 440 });
-    this.parameters = PARAMETER_NAMES.map((key) => {
-      const { title, symbol: letter } = PARAMETERS[key];
-      return { key, chart: new Chart({ name, id: key.replaceAll("_", "-"), title, letter, height: 300 }) };
-    });
-    const overAll = { id: "landscape", title: "A parameter over cycles and pressure", spatial: true, wide: true };
-    this.landscape = new Chart({ name, ...overAll, height: 440 });
-    this.law = new Chart({ name, id: "pressure-law", title: "A parameter over pressure", height: 360 });
-    within("stribeck", ".charts").append(this.curves.element, this.surface.element);
-    const charts = [...this.parameters.map(({ chart }) => chart), this.landscape, this.law];
-    within("parameters", ".charts").append(...charts.map(({ element }) => element));
-    /** @type {{ tests: StribeckItem[], items: DegradationItem[], events: Receipt[] }} */
-    this.answers = { tests: [], items: [], events: [] };
-    /** @type {{ pressure?: number, run?: string, lawRun?: string, by: "state" | "pressure", over: Depth, parameter: ParameterName, law: ParameterName }} */
-    this.chosen = { by: "state", over: "pressure", parameter: "static_torque_nm", law: "static_torque_nm" };
+/** @type {(page: Page) => { show: () => Promise<void> }} */
+export function curvesTab({ reader }) {
+  const { name } = reader;
+  const curves = new Chart({ name, id: "stribeck", title: "Stribeck curves", height: 440 });
+  const spatial = new Chart({ name, id: "surface", title: "Stribeck curves in 3D", spatial: true, height: 440 });
+  const parameters = PARAMETER_NAMES.map((key) => {
+    const { title, symbol: letter } = PARAMETERS[key];
+    return { key, chart: new Chart({ name, id: key.replaceAll("_", "-"), title, letter, height: 300 }) };
+  });
+  const overAll = { id: "landscape", title: "A parameter over cycles and pressure", spatial: true, wide: true };
+  const whole = new Chart({ name, ...overAll, height: 440 });
+  const law = new Chart({ name, id: "pressure-law", title: "A parameter over pressure", height: 360 });
+  within("stribeck", ".charts").append(curves.element, spatial.element);
+  const below = [...parameters.map(({ chart }) => chart), whole, law];
+  within("parameters", ".charts").append(...below.map(({ element }) => element));
+  /** @type {{ tests: StribeckItem[], items: DegradationItem[], events: Receipt[] }} */
+  let answers = { tests: [], items: [], events: [] };
+  /** @type {{ pressure?: number, run?: string, lawRun?: string, by: "state" | "pressure", over: Depth, parameter: ParameterName, law: ParameterName }} */
+  const chosen = { by: "state", over: "pressure", parameter: "static_torque_nm", law: "static_torque_nm" };
+  const choose = chooser(chosen, (what) => {
+    if (["pressure", "run", "by", "over"].includes(what)) drawCurves();
+    if (["pressure", "lawRun", "parameter", "law"].includes(what)) drawParameters();
+  });
+  const pressure = () => usual(pressuresOf(answers.tests), chosen.pressure);
+  const level = () => choose("pressure", "Pressure", levelOptions(pressuresOf(answers.tests)), pressure());
+
+  async function drawCurves() {
+    const ids = answers.tests.map((test) => test.run_id);
+    const onSurface = chosen.over === "cycles" ? spread(ids, MAX_ON_SURFACE) : [];
+    await reader.records([...spread(ids), ...onSurface, ids.find((id) => id === chosen.run)]);
+    const { tests } = answers;
+    const { over, by } = chosen; // another one may be chosen by now
+    const run = (tests.find(({ run_id: id }) => id === chosen.run) ?? tests[0])?.run_id;
+    const shared = { tests, clutch: reader.present(), channels: reader.channels, pressure: pressure(), run };
+    const state = () => choose("run", "Cycles", stateOptions(tests), run);
+    const more = { pressure: [state], states: [], cycles: [level] }[over];
+    const present = tests.length > 0;
+    setControls(curves, present ? [choose("by", "Colour by", BY), by === "state" ? level() : state()] : []);
+    curves.show(flat({ ...shared, by }));
+    const controls = () => [choose("over", "Torque over speed and", DEPTHS), ...more.map((each) => each())];
+    setControls(spatial, present ? controls() : []);
+    spatial.show(surface({ ...shared, over }));
   }
 
-  async show() {
-    const { reader } = this;
-    const [tests, { items }, events] = await Promise.all([reader.tests(), reader.degradation(), reader.events()]);
-    this.answers = { tests, items, events };
-    this.drawParameters();
-    await this.readRecords();
-    this.drawCurves();
-  }
-
-  /** The records of the tests that are drawn. */
-  readRecords() {
-    const ids = this.answers.tests.map((test) => test.run_id);
-    const spatial = this.chosen.over === "cycles" ? spread(ids, MAX_ON_SURFACE) : [];
-    return this.reader.records([...spread(ids), ...spatial, ids.find((id) => id === this.chosen.run)]);
-  }
-
-  pressure = () => usual(pressuresOf(this.answers.tests), this.chosen.pressure);
-
-  pressureChoice = () =>
-    choice("Pressure", levelOptions(pressuresOf(this.answers.tests)), this.pressure(), (value) => {
-      this.chosen.pressure = value;
-      this.drawCurves();
-      this.drawParameters();
-    });
-
-  drawCurves() {
-    const { tests } = this.answers;
-    const { over, by } = this.chosen;
-    const run = tests.some((test) => test.run_id === this.chosen.run) ? this.chosen.run : tests[0]?.run_id;
-    const { channels } = this.reader;
-    const shared = { tests, clutch: this.reader.present(), channels, pressure: this.pressure(), run };
-    const state = () =>
-      choice("Cycles", stateOptions(tests), run, async (value) => {
-        this.chosen.run = value;
-        await this.readRecords();
-        this.drawCurves();
-      });
-    const colour = choice("Colour by", BY, by, (value) => {
-      this.chosen.by = value;
-      this.drawCurves();
-    });
-    setControls(this.curves, tests.length > 0 ? [colour, by === "state" ? this.pressureChoice() : state()] : []);
-    this.curves.show(flat({ ...shared, by }));
-    const axis = choice("Torque over speed and", DEPTHS, over, async (value) => {
-      this.chosen.over = value;
-      await this.readRecords();
-      this.drawCurves();
-    });
-    const more = { pressure: state, states: null, cycles: this.pressureChoice }[over];
-    setControls(this.surface, tests.length > 0 ? [axis, ...(more ? [more()] : [])] : []);
-    this.surface.show(surface({ ...shared, over }));
-  }
-
-  drawParameters() {
-    const { items, events, tests } = this.answers;
-    for (const { key, chart } of this.parameters) {
-      setControls(chart, tests.length > 0 ? [this.pressureChoice()] : []);
-      chart.show(parameter({ items, events, name: key, pressure: this.pressure() }));
+  function drawParameters() {
+    const { items, events, tests } = answers;
+    for (const { key, chart } of parameters) {
+      setControls(chart, tests.length > 0 ? [level()] : []);
+      chart.show(parameter({ items, events, name: key, pressure: pressure() }));
     }
-    const which = (/** @type {"parameter" | "law"} */ of) =>
-      choice("Parameter", NAMES, this.chosen[of], (value) => {
-        this.chosen[of] = value;
-        this.drawParameters();
-      });
-    setControls(this.landscape, [which("parameter")]);
-    this.landscape.show(landscape({ items, name: this.chosen.parameter }));
-    const test = tests.find(({ run_id: id }) => id === this.chosen.lawRun) ?? tests[0];
-    const state = choice("Cycles", stateOptions(tests), test?.run_id, (value) => {
-      this.chosen.lawRun = value;
-      this.drawParameters();
-    });
-    setControls(this.law, tests.length > 0 ? [which("law"), state] : []);
-    this.law.show(pressureLaw({ test, name: this.chosen.law }));
+    setControls(whole, [choose("parameter", "Parameter", NAMES)]);
+    whole.show(landscape({ items, name: chosen.parameter }));
+    const test = tests.find(({ run_id: id }) => id === chosen.lawRun) ?? tests[0];
+    const state = choose("lawRun", "Cycles", stateOptions(tests), test?.run_id);
+    setControls(law, tests.length > 0 ? [choose("law", "Parameter", NAMES), state] : []);
+    law.show(pressureLaw({ test, name: chosen.law }));
   }
+
+  return {
+    show: async () => {
+      const [tests, { items }, events] = await Promise.all([reader.tests(), reader.degradation(), reader.events()]);
+      answers = { tests, items, events };
+      drawParameters();
+      await drawCurves();
+    },
+  };
 }

@@ -16,16 +16,14 @@ import { heldText, stateIcon } from "../shared/state.js";
 export function head(clutch, { archive, end }) {
   const { state, headline, action } = clutch;
   const [word, ...rest] = headline.split(": ");
-  const simulated = clutch.origin === "simulated" && h("span", { class: "tag" }, "simulated");
+  const simulated = clutch.origin === "simulated" && h("span.tag", "simulated");
   const ended = clutch.summary?.ended ?? null;
   return [
     h(
-      "div",
-      { class: "title" },
+      "div.title",
       h(
-        "div",
-        { class: "name" },
-        h("h1", {}, clutch.clutch_id, simulated),
+        "div.row.name",
+        h("h1", clutch.clutch_id, simulated),
         !clutch.archived &&
           menu("More", [
             ...(clutch.summary ? [{ label: ended ? "Take the end back …" : "End of life …", onclick: end }] : []),
@@ -34,14 +32,14 @@ export function head(clutch, { archive, end }) {
       ),
       h(
         "p",
-        { class: `verdict state state-${state.name}`, id: "headline" },
+        { class: `row verdict state state-${state.name}`, id: "headline" },
         stateIcon(state.name),
-        h("b", {}, word),
-        h("span", { class: "says" }, rest.join(": ")),
+        h("b", word),
+        h("span.says", rest.join(": ")),
         clutch.held > 0 && h("a", { href: "#/overview", class: "mark-held" }, heldText(clutch.held)),
       ),
-      h("p", { class: "action", id: "action" }, action),
-      h("p", { class: "quiet description" }, description(clutch)),
+      h("p.action", { id: "action" }, action),
+      h("p.quiet.description", description(clutch)),
     ),
   ];
 }

@@ -4,15 +4,15 @@
 
 import { Chart } from "../charts/chart.js";
 import { remainingCycles } from "../charts/life.js";
-import { Inspections } from "../inspections/inspections.js";
-import { clutchPath, read } from "../shared/api.js";
+import { inspections } from "../inspections/inspections.js";
+import { clutchPath, readAll } from "../shared/api.js";
 import { button, h, quiet, scrolling, table, within } from "../shared/dom.js";
 import { files } from "../shared/files.js";
 import { fixed, moment, words } from "../shared/format.js";
 import { askInspection } from "./changes.js";
 import { runLink } from "./warnings.js";
 
-/** @import { Change, ListPage, Receipt } from "../shared/types.js" */
+/** @import { Change, Receipt } from "../shared/types.js" */
 /** @import { Page } from "./clutch.js" */
 
 const PAGE = 20;
@@ -36,44 +36,20 @@ const ACTIONS = {
   restore_inspection: "Inspection restored",
 };
 
-class AuditTrail {
-  /**
-   * @param {HTMLElement} place
-   * @param {string} clutchId
-   */
-  constructor(place, clutchId) {
-    this.place = place;
-    this.clutchId = clutchId;
-    this.pages = 1;
-  }
-
-  /** Read as many pages as are shown. */
-  async read() {
-    /** @type {Change[]} */
-    const changes = [];
-    /** @type {string | null} */
-    let cursor = null;
-    for (let page = 0; page < this.pages && (page === 0 || cursor !== null); page += 1) {
-      /** @type {string} */
-      const more = cursor === null ? "" : `&cursor=${encodeURIComponent(cursor)}`;
-      /** @type {{ body: ListPage<Change> }} */
-      const { body } = await read(`${clutchPath(this.clutchId)}/changes?limit=${PAGE}${more}`);
-      changes.push(...body.items);
-      cursor = body.next ?? null;
-    }
-    return { changes, more: cursor !== null };
-  }
-
-  /** @param {Receipt[]} runs */
-  async show(runs) {
-    const { changes, more } = await this.read();
+/** @type {(place: HTMLElement, clutchId: string) => (runs: Receipt[]) => Promise<void>} reads as many pages as are shown */
+function auditTrail(place, clutchId) {
+  const path = `${clutchPath(clutchId)}/changes`;
+  let pages = 1;
+  return async function show(runs) {
+    /** @type {{ items: Change[], more: boolean }} */
+    const { items, more } = await readAll(`${path}?limit=${PAGE}`, pages);
     const named = new Map(runs.map((run) => [run.run_id, run]));
     /** @param {string | null} id */
     const subject = (id) => {
       const run = named.get(id ?? "");
       return run ? runLink(run) : id === null ? "the clutch" : id;
     };
-    const rows = changes.map((change) => [
+    const rows = items.map((change) => [
       moment(change.at),
       actionText(change),
       subject(change.run_id),
@@ -81,20 +57,18 @@ class AuditTrail {
       change.reason || "–",
     ]);
     const next = () => {
-      this.pages += 1;
-      this.show(runs);
+      pages += 1;
+      show(runs);
     };
-    this.place.replaceChildren(
-      changes.length === 0
+    const saved = files(`${clutchId}-changes`, `${path}.csv`);
+    place.replaceChildren(
+      rows.length === 0
         ? quiet("Nothing was held, corrected, withdrawn, edited or adopted.")
-        : quiet(
-            "Who changed what and why, the newest first. ",
-            files(`${this.clutchId}-changes`, `${clutchPath(this.clutchId)}/changes.csv`),
-          ),
-      rows.length > 0 ? h("div", { class: "panel" }, scrolling("Changes", table("Changes", COLUMNS, rows))) : "",
+        : quiet("Who changed what and why, the newest first. ", saved),
+      rows.length > 0 ? h("div.panel", scrolling("Changes", table("Changes", COLUMNS, rows))) : "",
       more ? button("Show earlier changes", next) : "",
     );
-  }
+  };
 }
 
 /** @param {Change} change */
@@ -117,35 +91,22 @@ function shown(value) {
     .join(", ");
 }
 
-export class History {
-  /** @param {Page} page */
-  constructor({ reader, done }) {
-    this.reader = reader;
-    const { name } = reader;
-    this.predicted = new Chart({ name, id: "predicted", title: "Remaining cycles, as predicted", wide: true });
-    within("predictions", ".charts").append(this.predicted.element);
-    this.inspections = new Inspections(within("inspections", ".body"), reader.id, name, (inspection) =>
-      done(askInspection(inspection)),
-    );
-    this.audit = new AuditTrail(within("changes", ".body"), reader.id);
-  }
-
-  async show() {
-    const { runs: counted } = this.reader.present();
-    this.predicted.element.hidden = counted === 0;
-    await Promise.all([this.poll(), this.showChanges(), counted > 0 && this.showPredictions()]);
-  }
-
-  async showChanges() {
-    await this.audit.show(await this.reader.runs());
-  }
-
-  async showPredictions() {
-    this.predicted.show(remainingCycles(await this.reader.forecast()));
-  }
-
+/** @type {(page: Page) => { show: () => Promise<void>, poll: () => Promise<void> }} */
+export function historyTab({ reader, done }) {
+  const { name } = reader;
+  const predicted = new Chart({ name, id: "predicted", title: "Remaining cycles, as predicted", wide: true });
+  within("predictions", ".charts").append(predicted.element);
+  const inspected = inspections(within("inspections", ".body"), reader, (one) => done(askInspection(one)));
+  const showChanges = auditTrail(within("changes", ".body"), reader.id);
   /** Inspections come without a change of the clutch. */
-  async poll() {
-    await this.inspections.poll(await this.reader.events());
-  }
+  const poll = async () => inspected(await reader.events());
+  const showPredictions = async () => predicted.show(remainingCycles(await reader.forecast()));
+  return {
+    poll,
+    show: async () => {
+      predicted.element.hidden = reader.present().runs === 0;
+      const changes = reader.runs().then(showChanges);
+      await Promise.all([poll(), changes, !predicted.element.hidden && showPredictions()]);
+    },
+  };
 }

@@ -1,7 +1,7 @@
 // @ts-check
 // The tab of the friction loops: torque over speed by state or pressure, and the lag of friction over cycles and pressure.
 
-import { Chart, choice, setControls } from "../charts/chart.js";
+import { Chart, chooser, setControls } from "../charts/chart.js";
 import { distinct } from "../charts/columns.js";
 import { loopCurves, loopPressures } from "../charts/loops.js";
 import { spread } from "../charts/stribeck.js";
@@ -17,110 +17,84 @@ import { BY } from "./curves.js";
 /** @import { DegradationItem, LoopItem, Receipt, StribeckItem } from "../shared/types.js" */
 /** @import { Page } from "./clutch.js" */
 
-export class Loops {
-  /** @param {Page} page */
-  constructor({ reader }) {
-    this.reader = reader;
-    const { name } = reader;
-    this.loops = new Chart({ name, id: "loop-curves", title: "Loops: torque over speed", wide: true, height: 420 });
-    this.overCycles = new Chart({ name, id: "lag-cycles", title: "Lag over cycles", height: 400 });
-    this.overPressure = new Chart({ name, id: "lag-pressure", title: "Lag over pressure", height: 400 });
-    within("loops", ".charts").append(this.loops.element);
-    within("lag", ".charts").append(this.overCycles.element, this.overPressure.element);
-    /** @type {{ loops: LoopItem[], tests: StribeckItem[], events: Receipt[], lag: DegradationItem[] | null }} */
-    this.answers = { loops: [], tests: [], events: [], lag: null };
-    /** @type {{ over: "state" | "pressure", pressure?: number, run?: string, lag: LagName, frequency?: number, lagPressure?: number }} */
-    this.chosen = { over: "state", lag: "loop_area" };
-    this.lags = new Lazy(byId("lag"), [this.overCycles, this.overPressure], () => this.readLag());
-  }
+/** @type {[LagName, string][]} */
+const QUANTITY_OPTIONS = LAG_NAMES.map((name) => [name, QUANTITIES[name].title]);
 
-  async show() {
-    const { reader } = this;
-    const [loops, tests, events] = await Promise.all([reader.loops(), reader.tests(), reader.events()]);
-    this.answers = { ...this.answers, loops, tests, events };
-    this.wantLag();
-    await this.readRecords();
-    this.draw();
-    this.drawLag();
-  }
+/** @type {(page: Page) => { show: () => Promise<void> }} */
+export function loopsTab({ reader }) {
+  const { name } = reader;
+  const curves = new Chart({ name, id: "loop-curves", title: "Loops: torque over speed", wide: true, height: 420 });
+  const overCycles = new Chart({ name, id: "lag-cycles", title: "Lag over cycles", height: 400 });
+  const overPressure = new Chart({ name, id: "lag-pressure", title: "Lag over pressure", height: 400 });
+  within("loops", ".charts").append(curves.element);
+  within("lag", ".charts").append(overCycles.element, overPressure.element);
+  /** @type {{ loops: LoopItem[], tests: StribeckItem[], events: Receipt[] }} */
+  let answers = { loops: [], tests: [], events: [] };
+  /** @type {DegradationItem[] | null} null: not read yet */
+  let lag = null;
+  /** @type {{ over: "state" | "pressure", pressure?: number, run?: string, lag: LagName, frequency?: number, lagPressure?: number }} */
+  const chosen = { over: "state", lag: "loop_area" };
+  const choose = chooser(chosen, (what) => {
+    if (what === "lag") {
+      lag = null;
+      wantLag();
+    } else if (what === "frequency" || what === "lagPressure") drawLag();
+    else draw();
+  });
+  const lags = new Lazy(byId("lag"), [overCycles, overPressure], readLag);
+  const wantLag = () => lags.want(`${reader.present().revision} ${chosen.lag}`);
 
-  readRecords() {
-    const ids = [...new Set(this.answers.loops.map((loop) => loop.run_id))];
-    return this.reader.records([...spread(ids), ids.find((id) => id === this.chosen.run)]);
-  }
-
-  draw() {
-    const { loops, tests } = this.answers;
+  async function draw() {
+    const ids = [...new Set(answers.loops.map((loop) => loop.run_id))];
+    await reader.records([...spread(ids), ids.find((id) => id === chosen.run)]);
+    const { loops, tests } = answers;
+    const { over } = chosen;
     const levels = loopPressures(loops);
+    const pressure = levels.find((level) => level === chosen.pressure) ?? levels[Math.floor(levels.length / 2)];
     const runs = [...new Map(loops.map((loop) => [loop.run_id, loop])).values()];
-    const middle = levels[Math.floor(levels.length / 2)];
-    const { over, pressure: chosen } = this.chosen;
-    const pressure = chosen !== undefined && levels.includes(chosen) ? chosen : middle;
-    const run = runs.some((loop) => loop.run_id === this.chosen.run) ? this.chosen.run : runs[0]?.run_id;
-    const axis = choice("Colour by", BY, over, (value) => {
-      this.chosen.over = value;
-      this.draw();
-    });
-    const level = choice("Pressure", levelOptions(levels), pressure, (value) => {
-      this.chosen.pressure = value;
-      this.draw();
-    });
-    const state = choice("Cycles", stateOptions(runs), run, async (value) => {
-      this.chosen.run = value;
-      await this.readRecords();
-      this.draw();
-    });
-    setControls(this.loops, loops.length > 0 ? [axis, over === "state" ? level : state] : []);
-    const { channels } = this.reader;
-    this.loops.show(loopCurves({ loops, tests, clutch: this.reader.present(), channels, over, pressure, run }));
+    const run = (runs.find(({ run_id: id }) => id === chosen.run) ?? runs[0])?.run_id;
+    const level = choose("pressure", "Pressure", levelOptions(levels), pressure);
+    const state = choose("run", "Cycles", stateOptions(runs), run);
+    const controls = [choose("over", "Colour by", BY), over === "state" ? level : state];
+    setControls(curves, loops.length > 0 ? controls : []);
+    const { channels } = reader;
+    curves.show(loopCurves({ loops, tests, clutch: reader.present(), channels, over, pressure, run }));
   }
 
-  wantLag() {
-    this.lags.want(`${this.reader.present().revision} ${this.chosen.lag}`);
-  }
-
-  async readLag() {
-    const { lag } = this.chosen;
+  async function readLag() {
+    const quantity = chosen.lag;
     /** @type {{ body: { items: DegradationItem[] } }} */
-    const { body } = await read(`${this.reader.path}/degradation?quantity=${lag}`);
-    if (lag !== this.chosen.lag) return; // another quantity was chosen meanwhile, and is read next
-    this.answers.lag = body.items;
-    this.drawLag();
+    const { body } = await read(`${reader.path}/degradation?quantity=${quantity}`);
+    if (quantity !== chosen.lag) return; // another quantity was chosen meanwhile, and is read next
+    lag = body.items;
+    drawLag();
   }
 
-  drawLag() {
-    const { lag, events } = this.answers;
-    const { lag: name } = this.chosen;
+  function drawLag() {
     if (lag === null) return;
-    const quantity = choice(
-      "Quantity",
-      LAG_NAMES.map((key) => [key, QUANTITIES[key].title]),
-      name,
-      (value) => {
-        this.chosen.lag = value;
-        this.answers.lag = null;
-        this.wantLag();
-      },
-    );
     const frequencies = distinct(lag.flatMap(({ frequency_hz: hz }) => (hz === null ? [] : [hz])));
-    const frequency = frequencies.find((hz) => hz === this.chosen.frequency) ?? frequencies[0];
+    const frequency = frequencies.find((hz) => hz === chosen.frequency) ?? frequencies[0];
     const items = lag.filter((item) => item.frequency_hz === frequency);
-    const pressure = usual(levelsOf(items), this.chosen.lagPressure);
-    const hertz = choice(
-      "Frequency",
-      frequencies.map((hz) => [hz, `${hz} Hz`]),
-      frequency,
-      (value) => {
-        this.chosen.frequency = value;
-        this.drawLag();
-      },
-    );
-    const level = choice("Band at", levelOptions(levelsOf(items)), pressure, (value) => {
-      this.chosen.lagPressure = value;
-      this.drawLag();
-    });
-    setControls(this.overCycles, items.length > 0 ? [quantity, hertz, level] : [quantity]);
-    this.overCycles.show(lagOverCycles({ items, name, pressure, events }));
-    this.overPressure.show(lagOverPressure({ items, name }));
+    const levels = levelsOf(items);
+    const pressure = usual(levels, chosen.lagPressure);
+    const quantity = choose("lag", "Quantity", QUANTITY_OPTIONS);
+    const hertz = frequencies.map((hz) => /** @type {[number, string]} */ ([hz, `${hz} Hz`]));
+    const more = [
+      choose("frequency", "Frequency", hertz, frequency),
+      choose("lagPressure", "Band at", levelOptions(levels), pressure),
+    ];
+    setControls(overCycles, [quantity, ...(items.length > 0 ? more : [])]);
+    overCycles.show(lagOverCycles({ items, name: chosen.lag, pressure, events: answers.events }));
+    overPressure.show(lagOverPressure({ items, name: chosen.lag }));
   }
+
+  return {
+    show: async () => {
+      const [loops, tests, events] = await Promise.all([reader.loops(), reader.tests(), reader.events()]);
+      answers = { loops, tests, events };
+      wantLag();
+      await draw();
+      drawLag();
+    },
+  };
 }

@@ -2,132 +2,116 @@
 // The first tab: runs that wait for someone, the state in figures, the forecast with its safe bound, mean COF beside the shudder
 // margin, and what limits the life first.
 
-import { Chart, choice, setControls } from "../charts/chart.js";
+import { Chart, chooser, setControls } from "../charts/chart.js";
 import { fan } from "../charts/fan.js";
 import { meanCof } from "../charts/life.js";
 import { levelOptions, levelsOf, usual } from "../quantities/choices.js";
 import { criteriaTable } from "../quantities/criteria.js";
 import { Lazy } from "../quantities/lazy.js";
-import { RemainingBy } from "../quantities/remaining.js";
+import { remainingBy } from "../quantities/remaining.js";
 import { shudderMargin } from "../quantities/shudder.js";
 import { read } from "../shared/api.js";
 import { h } from "../shared/dom.js";
 import { atLeast, estimate, fixed, likely, percent, probability, roundedDown } from "../shared/format.js";
 import { healthBar } from "../shared/sparkline.js";
 import { firstRun } from "../shared/welcome.js";
-import { heldView } from "./warnings.js";
-import { PlannedDuty } from "./planned_duty.js";
-import { lifeWarnings, warningsView } from "./warnings.js";
+import { plannedDuty } from "./planned_duty.js";
+import { heldView, lifeWarnings, warningsView } from "./warnings.js";
 
 /** @import { Content } from "../shared/dom.js" */
 /** @import { ClutchOut, CourseShare, CriterionOutcome, DegradationItem, Receipt, RemainingLife } from "../shared/types.js" */
 /** @import { Page } from "./clutch.js" */
 
-export class Overview {
-  /**
-   * @param {HTMLElement} place
-   * @param {Page} page
-   */
-  constructor(place, page) {
-    const { reader } = page;
-    this.page = page;
-    this.reader = reader;
-    const { name } = reader;
-    this.fan = new Chart({ name, id: "fan", title: "Mean COF against its threshold", wide: true, height: 330 });
-    this.cof = new Chart({ name, id: "cof", title: "Mean COF by pressure", height: 270 });
-    this.shudder = new Chart({ name, id: "shudder", title: "Shudder margin", height: 270 });
-    this.top = h("div", {});
-    this.tiles = h("dl", { class: "tiles" });
-    this.limits = h("div", {});
-    const charts = h("div", { class: "charts" }, this.fan.element, this.cof.element, this.shudder.element);
-    const more = h("div", { class: "more" });
-    const title = h("h2", { class: "hidden" }, "Overview");
-    this.body = h("div", { hidden: true }, title, this.tiles, this.limits, charts, more);
-    place.append(this.top, this.body);
-    this.planned = new PlannedDuty(more, reader.id);
-    this.by = new RemainingBy(more, reader.id);
-    /** @type {{ slopes: DegradationItem[] | null, limits: CriterionOutcome[] | null }} null: not computed yet */
-    this.tracked = { slopes: null, limits: null };
-    /** @type {number | undefined} bar */
-    this.level = undefined;
-    /** @type {Receipt[]} */
-    this.events = [];
-    this.slopes = new Lazy(this.shudder.element, [this.shudder], () => this.readSlopes());
-  }
+/** @type {(place: HTMLElement, page: Page) => { show: () => Promise<void>, charts: Chart[] }} `charts`: of the printed page */
+export function overviewTab(place, page) {
+  const { reader } = page;
+  const { name } = reader;
+  const forecast = new Chart({ name, id: "fan", title: "Mean COF against its threshold", wide: true, height: 330 });
+  const cof = new Chart({ name, id: "cof", title: "Mean COF by pressure", height: 270 });
+  const shudder = new Chart({ name, id: "shudder", title: "Shudder margin", height: 270 });
+  const top = h("div");
+  const figures = h("dl.tiles");
+  const limits = h("div");
+  const charts = h("div.charts", forecast.element, cof.element, shudder.element);
+  const more = h("div.more");
+  const body = h("div", { hidden: true }, h("h2.hidden", "Overview"), figures, limits, charts, more);
+  place.append(top, body);
+  plannedDuty(more, reader.id);
+  const showRemaining = remainingBy(more, reader);
+  /** @type {{ slopes: DegradationItem[] | null, limits: CriterionOutcome[] | null }} null: not computed yet */
+  let tracked = { slopes: null, limits: null };
+  /** @type {{ level?: number }} bar */
+  const chosen = {};
+  /** @type {Receipt[]} */
+  let events = [];
+  const slopes = new Lazy(shudder.element, [shudder], readSlopes);
+  const wantSlopes = async () => slopes.want(`${(await reader.life()).revision} ${chosen.level}`);
+  const choose = chooser(chosen, () => {
+    tracked.limits = null;
+    drawShudder();
+    wantSlopes();
+  });
 
-  async show() {
-    const { reader } = this;
+  async function show() {
     const clutch = reader.present();
     const held = clutch.held > 0 ? (await reader.held()).reverse() : [];
-    const heldPart = held.length > 0 && h("section", { id: "held" }, heldView(held, this.page));
-    this.body.hidden = clutch.runs === 0;
-    if (clutch.runs === 0) {
-      const first = clutch.held === 0 && h("div", { id: "first" }, firstRun(clutch.clutch_id));
-      this.top.replaceChildren(...[heldPart, first].filter((part) => part !== false));
-      return;
-    }
-    // figures first: what takes the service longer follows
-    this.top.replaceChildren(...(heldPart ? [heldPart] : []));
+    const parts = held.length > 0 ? [h("section", { id: "held" }, heldView(held, page))] : [];
+    body.hidden = clutch.runs === 0;
+    if (clutch.runs === 0 && clutch.held === 0) parts.push(h("div", { id: "first" }, firstRun(clutch.clutch_id)));
+    top.replaceChildren(...parts); // figures first: what takes the service longer follows
+    if (clutch.runs === 0) return;
     const life = await reader.life();
-    this.tiles.replaceChildren(...tiles(clutch, life));
-    this.limits.replaceChildren(...criteriaTable(life));
-    const [tests, events] = await Promise.all([reader.tests(), reader.events()]);
-    this.events = events;
-    this.cof.show(meanCof({ tests, events }));
-    this.by.show({ life, tests, loops: reader.loops });
-    this.slopes.want(`${life.revision} ${this.level}`);
-    const [{ life: shown, pooled, predictions }, degradation] = await Promise.all([
-      reader.forecast(),
-      reader.degradation(),
-    ]);
+    figures.replaceChildren(...tiles(clutch, life));
+    limits.replaceChildren(...criteriaTable(life));
+    const [tests, marks] = await Promise.all([reader.tests(), reader.events()]);
+    events = marks;
+    cof.show(meanCof({ tests, events }));
+    showRemaining(life, tests);
+    wantSlopes();
+    const [shown, degradation] = await Promise.all([reader.forecast(), reader.degradation()]);
     // what held runs would change, the remaining life says
     const further = degradation.warnings.filter(({ code }) => code !== "held_runs");
     const odd = lifeWarnings({ warned: [...life.warnings, ...further], tests });
-    const warned = odd.length > 0 && h("section", { id: "warnings" }, warningsView(odd));
-    this.top.replaceChildren(...[heldPart, warned].filter((part) => part !== false));
-    this.fan.show(fan({ life: shown, pooled, predictions, events }));
-    this.drawShudder();
+    top.replaceChildren(...parts, odd.length > 0 ? h("section", { id: "warnings" }, warningsView(odd)) : "");
+    forecast.show(fan(shown));
+    drawShudder();
   }
 
   /** The slopes are shown as soon as they are there; when they reach their limit is computed after that. */
-  async readSlopes() {
+  async function readSlopes() {
     /** @type {{ body: { items: DegradationItem[] } }} */
-    const { body } = await read(`${this.reader.path}/degradation?quantity=slope`);
-    this.tracked = { slopes: body.items, limits: null };
-    this.drawShudder();
-    const level = this.slopeLevel();
+    const { body } = await read(`${reader.path}/degradation?quantity=slope`);
+    tracked = { slopes: body.items, limits: null };
+    drawShudder();
+    const level = slopeLevel();
     if (level === undefined) return;
-    const life = await this.reader.life();
-    const own = life.criteria.filter((end) => end.quantity === "slope" && end.pressure_bar === level);
-    const limits = own.length > 0 ? own : await this.readLimits(level);
-    if (level !== this.slopeLevel()) return; // another pressure was chosen meanwhile, and is read next
-    this.tracked = { ...this.tracked, limits };
-    this.drawShudder();
+    const { criteria } = await reader.life();
+    const own = criteria.filter((end) => end.quantity === "slope" && end.pressure_bar === level);
+    const found = own.length > 0 ? own : await readLimits(level);
+    if (level !== slopeLevel()) return; // another pressure was chosen meanwhile, and is read next
+    tracked.limits = found;
+    drawShudder();
   }
 
   /** @param {number} level bar */
-  async readLimits(level) {
+  async function readLimits(level) {
     /** @type {{ body: RemainingLife }} */
-    const { body } = await read(`${this.reader.path}/remaining-useful-life?quantity=slope&pressure_bar=${level}`);
+    const { body } = await read(`${reader.path}/remaining-useful-life?quantity=slope&pressure_bar=${level}`);
     return body.criteria;
   }
 
-  slopeLevel = () => usual(levelsOf(this.tracked.slopes ?? []), this.level);
+  const slopeLevel = () => usual(levelsOf(tracked.slopes ?? []), chosen.level);
 
-  drawShudder() {
-    const { slopes, limits } = this.tracked;
-    if (slopes === null) return;
-    const pressure = this.slopeLevel();
-    const level = choice("Pressure", levelOptions(levelsOf(slopes)), pressure, async (value) => {
-      this.level = value;
-      this.tracked.limits = null;
-      this.drawShudder();
-      this.slopes.want(`${(await this.reader.life()).revision} ${this.level}`);
-    });
-    setControls(this.shudder, slopes.length > 0 ? [level] : []);
-    const items = slopes.filter((item) => item.pressure_bar === pressure);
-    this.shudder.show(shudderMargin({ items, limits, events: this.events }));
+  function drawShudder() {
+    const { slopes: all, limits: found } = tracked;
+    if (all === null) return;
+    const pressure = slopeLevel();
+    setControls(shudder, all.length > 0 ? [choose("level", "Pressure", levelOptions(levelsOf(all)), pressure)] : []);
+    const items = all.filter((item) => item.pressure_bar === pressure);
+    shudder.show(shudderMargin({ items, limits: found, events }));
   }
+
+  return { show, charts: [forecast, shudder] };
 }
 
 /** @type {(clutch: ClutchOut, life: RemainingLife) => HTMLElement[]} */
@@ -176,11 +160,10 @@ function remainingNotes(life) {
 }
 
 /** @param {string} text */
-const small = (text) => h("small", {}, text);
+const small = (text) => h("small", text);
 
 /** @type {(name: string, value: string, more: Content) => HTMLElement} */
-const tile = (name, value, more) =>
-  h("div", { class: "tile" }, h("dt", {}, name), h("dd", {}, h("span", { class: "big" }, value), more));
+const tile = (name, value, more) => h("div.tile", h("dt", name), h("dd", h("span.big", value), more));
 
 /** @param {RemainingLife} life */
 const predicts = ({ status }) => status === "predicted" || status === "may_never_reach";

@@ -6,193 +6,166 @@ import { button, field, h, quiet, scrolling, table } from "../shared/dom.js";
 import { fixed, NOT_A_NUMBER, numberOf, significant, sentence } from "../shared/format.js";
 import { problemView } from "../shared/problem_view.js";
 
-/** @import { PlannedLife, ProblemError, Quantiles } from "../shared/types.js" */
+/** @import { PlannedLife, Quantiles } from "../shared/types.js" */
 
-/** @typedef {{ name: string, label: string, value?: string }} Entry a number of the form; left empty it is not sent */
-
-/** @type {Entry[]} */
+/** @type {[name: string, label: string, value?: string][]} what is typed of a block; left empty it is not sent */
 const OF_BLOCK = [
-  { name: "energy_per_cycle_kj", label: "Energy per cycle, kJ" },
-  { name: "cycles", label: "Duty cycles", value: "1000" },
-  { name: "sd", label: "Standard deviation of this energy, kJ" },
+  ["energy_per_cycle_kj", "Energy per cycle, kJ"],
+  ["cycles", "Duty cycles", "1000"],
+  ["sd", "Standard deviation of this energy, kJ"],
 ];
-/** @type {Entry} */
-const PACE = { name: "pace_cycles_per_hour", label: "Pace, duty cycles per hour (idle hours included)" };
+const PACE = "pace_cycles_per_hour";
 /** What is shown of the answer's quantiles. */
 const SHOWN = ["0.05", "0.5", "0.95"];
 
-export class PlannedDuty {
-  /**
-   * @param {HTMLElement} place
-   * @param {string} clutchId
-   */
-  constructor(place, clutchId) {
-    this.address = `${clutchPath(clutchId)}/remaining-useful-life/forecast`;
-    /** @type {string | undefined} what a planned cycle counts by; undefined: as the service assumes */
-    this.countedBy = undefined;
-    this.blocks = h("div", { class: "blocks" });
-    this.pace = h("div", { class: "fields" }, number(`/${PACE.name}`, PACE));
-    this.answer = h("div", { class: "answer", "aria-live": "polite" });
-    this.go = h("button", { class: "main" }, "Predict");
-    const more = button("Add a block", () => this.add());
-    const buttons = h("div", { class: "buttons" }, more, this.go);
-    this.form = h("form", { novalidate: true, onsubmit: this.submit }, this.blocks, this.pace, buttons, this.answer);
-    const about = "The blocks run one after the other and repeat until the end of life. Fields may stay empty.";
-    place.append(h("details", { class: "planned" }, h("summary", {}, "Planned duty"), quiet(about), this.form));
-    this.append();
-  }
+/** @typedef {{ input: HTMLInputElement, note: HTMLElement }} Entry what is typed, and below it what is wrong with it */
+/** @typedef {{ element: HTMLElement, legend: HTMLElement, remove: HTMLButtonElement, note: HTMLElement, entries: Entry[] }} Block */
 
-  /** A block at the end, with the focus in it. */
-  add() {
-    this.append();
-    focus(this.blocks, "fieldset:last-child input");
-  }
+/** Numbers the fields: labels need names of their own. */
+let count = 0;
 
-  append() {
-    const block = h("fieldset", {});
-    const remove = () => {
-      block.remove();
-      this.renumber();
-      focus(this.blocks, "fieldset:last-child input");
-    };
-    block.append(
-      h("legend", {}),
-      h(
-        "div",
-        { class: "fields" },
-        OF_BLOCK.map((entry) => number("", entry)),
-      ),
-      h("p", { class: "wrong", hidden: true }),
-      button("Remove", remove, { class: "remove" }),
-    );
-    this.blocks.append(block);
-    this.renumber();
-  }
+/** @type {(name: string, label: string, value?: string) => Entry & { element: HTMLElement }} a number of the form */
+function entry(name, label, value = "") {
+  const id = `planned-${(count += 1)}`;
+  const input = h("input", { id, name, value, inputmode: "decimal", autocomplete: "off" });
+  const note = wrongNote();
+  return { input, note, element: field(input, label, note) };
+}
 
-  /** Names, places of errors and buttons follow a block's number. */
-  renumber() {
-    const blocks = [...this.blocks.querySelectorAll("fieldset")];
-    for (const [place, block] of blocks.entries()) {
-      const title = `Block ${place + 1}`;
-      const remove = block.querySelector("button");
-      block.dataset.pointer = `/programme/${place}`;
-      block.querySelector("legend")?.replaceChildren(title);
-      remove?.setAttribute("aria-label", `Remove block ${place + 1}`);
-      if (remove) remove.hidden = blocks.length === 1;
-      for (const input of block.querySelectorAll("input")) {
-        input.dataset.pointer = `/programme/${place}/${input.name}`;
-        input.id = idOf(input.dataset.pointer);
-        const label = input.parentElement?.querySelector("label");
-        label?.setAttribute("for", input.id);
-      }
-    }
-  }
+const wrongNote = () => h("p.wrong", { id: `planned-${(count += 1)}`, hidden: true });
 
-  submit = async (/** @type {SubmitEvent} */ event) => {
-    event.preventDefault();
-    this.countedBy = undefined;
-    await this.ask();
+/** @type {(place: HTMLElement, clutchId: string) => void} */
+export function plannedDuty(place, clutchId) {
+  const address = `${clutchPath(clutchId)}/remaining-useful-life/forecast`;
+  /** @type {string | undefined} what a planned cycle counts by; undefined: as the service assumes */
+  let countedBy;
+  /** @type {Block[]} */
+  let blocks = [];
+  const pace = entry(PACE, "Pace, duty cycles per hour (idle hours included)");
+  const all = h("div.blocks");
+  const answer = h("div.answer", { "aria-live": "polite" });
+  const go = h("button.main", "Predict");
+  const add = () => {
+    append();
+    focusLast();
   };
+  const buttons = h("div.row.buttons", button("Add a block", add), go);
+  const onsubmit = (/** @type {SubmitEvent} */ event) => {
+    event.preventDefault();
+    countedBy = undefined;
+    ask();
+  };
+  const form = h("form", { novalidate: true, onsubmit }, all, h("div.fields", pace.element), buttons, answer);
+  const about = "The blocks run one after the other and repeat until the end of life. Fields may stay empty.";
+  place.append(h("details.planned", h("summary", "Planned duty"), quiet(about), form));
+  append();
 
-  async ask() {
-    this.clear();
-    const unread = [...this.form.querySelectorAll("input")].filter((input) => numberOf(input.value) === undefined);
-    for (const input of unread) this.mark({ pointer: input.dataset.pointer ?? "", message: NOT_A_NUMBER });
-    if (unread.length > 0) {
-      this.answer.replaceChildren();
-      focus(this.form, "[aria-invalid]");
-      return;
+  const focusLast = () => blocks.at(-1)?.entries[0].input.focus();
+
+  function append() {
+    const entries = OF_BLOCK.map((each) => entry(...each));
+    const fields = h("div.fields", ...entries.map(({ element }) => element));
+    const [legend, note] = [h("legend"), wrongNote()];
+    const remove = button("Remove", () => drop(block), { class: "remove" });
+    const block = { element: h("fieldset", legend, fields, note, remove), legend, remove, note, entries };
+    all.append(block.element);
+    blocks.push(block);
+    renumber();
+  }
+
+  /** @param {Block} block */
+  function drop(block) {
+    block.element.remove();
+    blocks = blocks.filter((other) => other !== block);
+    renumber();
+    focusLast();
+  }
+
+  function renumber() {
+    for (const [place, { legend, remove }] of blocks.entries()) {
+      legend.textContent = `Block ${place + 1}`;
+      remove.setAttribute("aria-label", `Remove block ${place + 1}`);
+      remove.hidden = blocks.length === 1;
     }
-    this.go.disabled = true;
-    this.answer.replaceChildren(quiet("Computing …"));
-    try {
-      /** @type {{ body: PlannedLife }} */
-      const { body } = await sendJson("POST", this.address, this.programme());
-      this.answer.replaceChildren(...shown(body), this.other(body));
-    } catch (problem) {
-      if (!(problem instanceof Problem)) throw problem;
-      const elsewhere = problem.errors.filter((error) => !this.mark(error));
-      const all = problem.errors.length > 0 && elsewhere.length === 0;
-      const marked = h("p", { class: "notice bad", role: "alert" }, "The plan is incomplete: see the marked fields.");
-      this.answer.replaceChildren(all ? marked : problemView(problem, "No prediction. "));
-      focus(this.form, "[aria-invalid]");
-    } finally {
-      this.go.disabled = false;
-    }
   }
 
-  /**
-   * The other way to count, in one click, where the service assumed one.
-   * @param {PlannedLife} life
-   */
-  other({ counted_by: by, warnings }) {
-    const assumed = warnings.some(({ code }) => code === "counted_by_energy");
-    if (!assumed && this.countedBy === undefined) return "";
-    const [next, label] =
-      by === "cycles" ? ["dissipated_energy", "Count by energy"] : ["cycles", "Count every cycle as one"];
-    const ask = () => {
-      this.countedBy = next;
-      this.ask();
-    };
-    return button(label, ask);
+  /** Every number by the place that an error of the service names; a block's own error is marked at its first number. */
+  function places() {
+    /** @type {[string, Entry][]} */
+    const numbers = blocks.flatMap(({ entries, note }, place) => [
+      [`/programme/${place}`, { input: entries[0].input, note }],
+      ...entries.map((each) => /** @type {[string, Entry]} */ ([`/programme/${place}/${each.input.name}`, each])),
+    ]);
+    return new Map([...numbers, [`/${PACE}`, pace]]);
   }
 
-  programme() {
-    const programme = [...this.blocks.querySelectorAll("fieldset")].map((block) => numbersIn(block));
-    return { programme, ...numbersIn(this.pace), counted_by: this.countedBy };
-  }
-
-  clear() {
-    for (const input of this.form.querySelectorAll("[aria-invalid]")) {
+  async function ask() {
+    const known = places();
+    for (const { input, note } of known.values()) {
       input.removeAttribute("aria-invalid");
       input.removeAttribute("aria-describedby");
-    }
-    for (const note of this.form.querySelectorAll(".wrong")) {
       note.replaceChildren();
-      note.toggleAttribute("hidden", true);
+      note.hidden = true;
+    }
+    const numbers = [...blocks.flatMap(({ entries }) => entries), pace];
+    const unread = numbers.filter(({ input }) => numberOf(input.value) === undefined);
+    for (const each of unread) mark(each, NOT_A_NUMBER);
+    if (unread.length > 0) {
+      answer.replaceChildren();
+      return focusWrong();
+    }
+    go.disabled = true;
+    answer.replaceChildren(quiet("Computing …"));
+    try {
+      const programme = blocks.map(({ entries }) => numbersIn(entries));
+      /** @type {{ body: PlannedLife }} */
+      const { body } = await sendJson("POST", address, { programme, ...numbersIn([pace]), counted_by: countedBy });
+      answer.replaceChildren(...shown(body), other(body));
+    } catch (problem) {
+      if (!(problem instanceof Problem)) throw problem;
+      const elsewhere = problem.errors.filter(({ pointer, message }) => !mark(known.get(pointer), message));
+      const marked = problem.errors.length > 0 && elsewhere.length === 0;
+      const see = h("p.notice.bad", { role: "alert" }, "The plan is incomplete: see the marked fields.");
+      answer.replaceChildren(marked ? see : problemView(problem, "No prediction. "));
+      focusWrong();
+    } finally {
+      go.disabled = false;
     }
   }
 
-  /**
-   * An error at the field or the block that it is about; whether there is one.
-   * @param {Pick<ProblemError, "pointer" | "message">} error
-   */
-  mark({ pointer, message }) {
-    const places = [...this.form.querySelectorAll("[data-pointer]")];
-    const place = places.find((element) => element instanceof HTMLElement && element.dataset.pointer === pointer);
-    if (place === undefined) return false;
-    const note = place instanceof HTMLInputElement ? place.nextElementSibling : place.querySelector(":scope > .wrong");
-    const input = place instanceof HTMLInputElement ? place : place.querySelector("input:last-of-type");
-    if (note === null || input === null) return false;
-    note.id = `${idOf(pointer)}-wrong`;
-    note.replaceChildren(message.replace(/^programme\S*: /, "")); // the field says where it is
-    note.toggleAttribute("hidden", false);
-    input.setAttribute("aria-invalid", "true");
-    input.setAttribute("aria-describedby", note.id);
-    return true;
+  function focusWrong() {
+    const first = form.querySelector("[aria-invalid]");
+    if (first instanceof HTMLElement) first.focus();
+  }
+
+  /** @type {(life: PlannedLife) => HTMLElement | string} the other way to count, in one click, where the service assumed one */
+  function other({ counted_by: by, warnings }) {
+    const assumed = warnings.some(({ code }) => code === "counted_by_energy");
+    if (!assumed && countedBy === undefined) return "";
+    const [next, label] =
+      by === "cycles" ? ["dissipated_energy", "Count by energy"] : ["cycles", "Count every cycle as one"];
+    return button(label, () => {
+      countedBy = next;
+      ask();
+    });
   }
 }
 
-/** @type {(place: HTMLElement, selector: string) => void} */
-function focus(place, selector) {
-  const element = place.querySelector(selector);
-  if (element instanceof HTMLElement) element.focus();
+/** @type {(entry: Entry | undefined, message: string) => boolean} an error at what it is about; whether that is known */
+function mark(entry, message) {
+  if (entry === undefined) return false;
+  const { input, note } = entry;
+  note.replaceChildren(message.replace(/^programme\S*: /, "")); // the field says where it is
+  note.hidden = false;
+  input.setAttribute("aria-invalid", "true");
+  input.setAttribute("aria-describedby", note.id);
+  return true;
 }
 
-/** @param {string} pointer */
-const idOf = (pointer) => `planned${pointer.replaceAll("/", "-")}`;
-
-/** @type {(pointer: string, entry: Entry) => HTMLElement} `pointer`: "" until the block has its number */
-function number(pointer, { name, label, value = "" }) {
-  const attributes = { inputmode: "decimal", autocomplete: "off" };
-  const input = h("input", { id: idOf(pointer), name, value, "data-pointer": pointer, ...attributes });
-  return field(input, label, h("p", { class: "wrong", hidden: true }));
-}
-
-/** @param {HTMLElement} place */
-function numbersIn(place) {
-  const filled = [...place.querySelectorAll("input")].filter((input) => input.value.trim() !== "");
-  return Object.fromEntries(filled.map((input) => [input.name, numberOf(input.value)]));
+/** @param {Entry[]} entries */
+function numbersIn(entries) {
+  const filled = entries.filter(({ input }) => input.value.trim() !== "");
+  return Object.fromEntries(filled.map(({ input }) => [input.name, numberOf(input.value)]));
 }
 
 /** @param {PlannedLife} life */
@@ -209,7 +182,7 @@ function shown(life) {
       const value = quantiles[quantile] ?? null;
       return value === null ? "over 1,000,000" : fixed(value, decimals);
     });
-  if (life.status === "insufficient_data") return [h("p", { class: "notice" }, sentence(life.statement))];
+  if (life.status === "insufficient_data") return [h("p.notice", sentence(life.statement))];
   const rows = [
     ["Remaining cycles", ...numbers(cycles, 0)],
     ["Remaining blocks", ...numbers(blocks, 1)],

@@ -26,23 +26,22 @@ export function makeReport(place, { clutch, life, tests = [], events = [], chart
   const { state, headline, action } = clutch;
   const simulated = clutch.origin === "simulated" ? ", simulated" : "";
   const kind = `Wet clutch, ${clutch.friction_material} on ${clutch.reaction_plate}, ${clutch.fluid}${simulated}`;
-  const values = life ? facts(clutch, life).flatMap(([name, value]) => [h("dt", {}, name), h("dd", {}, value)]) : [];
+  const values = life ? facts(clutch, life).flatMap(([name, value]) => [h("dt", name), h("dd", value)]) : [];
   const last = tests.slice(-LAST_TESTS);
   place.replaceChildren(
     h(
       "header",
-      {},
-      h("div", {}, h("h1", {}, clutch.clutch_id), h("p", {}, kind)),
-      h("p", { class: "made" }, `Clutchlife ${RELEASE}`, h("br"), moment(new Date().toISOString())),
+      h("div", h("h1", clutch.clutch_id), h("p", kind)),
+      h("p.made", `Clutchlife ${RELEASE}`, h("br"), moment(new Date().toISOString())),
     ),
-    h("p", { class: "state" }, stateIcon(state.name), h("span", {}, headline)),
-    h("p", { class: "action" }, action),
-    h("dl", { class: "facts" }, values),
+    h("p.state", stateIcon(state.name), h("span", headline)),
+    h("p.action", action),
+    h("dl.facts", values),
     ...drawings.flatMap((src) => (src === null ? [] : [h("img", { src, alt: "" })])),
-    h("p", {}, h("b", {}, "Diagnosis: "), diagnosisText(clutch.diagnosis)),
+    h("p", h("b", "Diagnosis: "), diagnosisText(clutch.diagnosis)),
     last.length > 0 ? table("The last tests", COLUMNS, last.map(testRow), { shown: true }) : "",
-    events.length > 0 ? h("p", {}, h("b", {}, "Events: "), events.slice(-LAST_EVENTS).map(eventText).join("; ")) : "",
-    h("p", { class: "basis" }, h("b", {}, "Made of: "), basis(clutch, life, tests)),
+    events.length > 0 ? h("p", h("b", "Events: "), events.slice(-LAST_EVENTS).map(eventText).join("; ")) : "",
+    h("p.basis", h("b", "Made of: "), basis(clutch, life, tests)),
   );
 }
 

@@ -36,7 +36,7 @@ export async function runCharts(run, reader) {
     record.show(recordOf(channels, channel));
   };
   draw(names.includes("torque_nm") ? "torque_nm" : names[0]);
-  if (run.fits.length === 0) return h("div", { class: "charts" }, record.element);
+  if (run.fits.length === 0) return h("div.charts", record.element);
   const test = { ...run, pressure_laws: null };
   const curves = new Chart({ name, id: `${id}-curve`, title: "Curve and fit", height: 300 });
   const residuals = new Chart({ name, id: `${id}-residuals`, title: "Residuals of the fit", height: 300 });
@@ -52,7 +52,7 @@ export async function runCharts(run, reader) {
     }),
   );
   residuals.show(residualsOf(run, channels, clutch));
-  return h("div", { class: "charts" }, curves.element, residuals.element, record.element);
+  return h("div.charts", curves.element, residuals.element, record.element);
 }
 
 /** @type {(run: Receipt, channels: Channels, clutch: ClutchOut) => Spec} */

@@ -16,157 +16,131 @@ import { runCharts } from "./run_view.js";
 /** Runs on a page of the list. */
 const PAGE = 25;
 
-export class Runs {
-  /**
-   * @param {HTMLElement} place
-   * @param {Page} page
-   */
-  constructor(place, { reader, done }) {
-    this.place = place;
-    this.reader = reader;
-    this.done = done;
-    this.first = 0;
-    /** @type {Receipt[]} the latest first */
-    this.runs = [];
-    /** @type {Set<string>} */
-    this.open = new Set();
-    this.revealed = "";
-  }
-
-  /** @param {string} runId that the address opens */
-  async show(runId) {
-    const focused = this.focusedRun();
-    this.runs = [...(await this.reader.runs())].reverse();
-    if (runId && runId !== this.revealed) this.reveal(runId);
-    else this.draw();
-    this.revealed = runId;
-    if (focused !== null) this.summaryOf(focused)?.focus({ preventScroll: true });
-  }
-
-  /** The run whose part of the list has the focus, which drawing takes away. */
-  focusedRun() {
-    const inside = this.place.contains(document.activeElement) ? document.activeElement : null;
-    return inside?.closest("details")?.dataset.run ?? null;
-  }
+/** @type {(place: HTMLElement, page: Page) => { show: (runId: string) => Promise<void> }} `runId`: that the address opens */
+export function runsTab(place, { reader, done }) {
+  let first = 0;
+  /** @type {Receipt[]} the latest first */
+  let runs = [];
+  /** @type {Set<string>} */
+  const open = new Set();
+  let revealed = "";
 
   /** @param {string} runId */
-  summaryOf(runId) {
-    const details = [...this.place.querySelectorAll("details")].find((element) => element.dataset.run === runId);
-    return details?.querySelector("summary") ?? null;
+  function summaryOf(runId) {
+    const details = [...place.querySelectorAll("details")].find((element) => element.dataset.run === runId);
+    return details?.querySelector("summary");
   }
 
   /** @type {(runId: string) => void} show a run, opened */
-  reveal(runId) {
-    const index = this.runs.findIndex((run) => run.run_id === runId);
+  function reveal(runId) {
+    const index = runs.findIndex((run) => run.run_id === runId);
     if (index < 0) return;
-    this.first = PAGE * Math.floor(index / PAGE);
-    this.open.add(runId);
-    this.draw();
-    const summary = this.summaryOf(runId);
+    first = PAGE * Math.floor(index / PAGE);
+    open.add(runId);
+    draw();
+    const summary = summaryOf(runId);
     summary?.scrollIntoView({ block: "center" });
     summary?.focus({ preventScroll: true });
   }
 
-  draw() {
-    const { length } = this.runs;
-    if (this.first >= length) this.first = 0;
-    const listed = this.runs.slice(this.first, this.first + PAGE);
-    this.place.replaceChildren(
-      quiet(`${this.summary()} `, files(`${this.reader.name()}-runs`, `${this.reader.path}/runs.csv`)),
-      h(
-        "div",
-        { class: "runs" },
-        listed.map((run) => this.item(run)),
-      ),
-      length > PAGE ? this.pager() : "",
-    );
+  function draw() {
+    if (first >= runs.length) first = 0;
+    const listed = runs.slice(first, first + PAGE).map((run) => item(run));
+    const saved = files(`${reader.name()}-runs`, `${reader.path}/runs.csv`);
+    const pages = runs.length > PAGE ? pager() : "";
+    place.replaceChildren(quiet(`${countsOf(runs)} `, saved), h("div.runs", listed), pages);
   }
 
-  summary() {
-    const { runs } = this;
-    const warned = runs.filter((run) => run.warnings.length > 0).length;
-    const [held, withdrawn] = ["held", "withdrawn"].map((state) => runs.filter((run) => run.state === state).length);
-    const parts = [`${runs.length} ${runs.length === 1 ? "run" : "runs"}`, `${warned} with warnings`];
-    if (held > 0) parts.push(`${held} held`);
-    if (withdrawn > 0) parts.push(`${withdrawn} withdrawn`);
-    return `${parts.join(", ")}.`;
-  }
-
-  pager() {
-    const last = Math.min(this.first + PAGE, this.runs.length);
-    /** @type {(label: string, first: number) => HTMLElement} */
-    const turn = (label, first) => {
+  function pager() {
+    const last = Math.min(first + PAGE, runs.length);
+    /** @type {(label: string, start: number) => HTMLElement} */
+    const turn = (label, start) => {
       const go = () => {
-        this.first = first;
-        this.draw();
-        this.place.scrollIntoView({ block: "start" });
-        this.place.querySelector("summary")?.focus({ preventScroll: true });
+        first = start;
+        draw();
+        place.scrollIntoView({ block: "start" });
+        place.querySelector("summary")?.focus({ preventScroll: true });
       };
-      return button(label, go, { disabled: first < 0 || first >= this.runs.length });
+      return button(label, go, { disabled: start < 0 || start >= runs.length });
     };
     return h(
-      "nav",
-      { class: "buttons start", "aria-label": "Pages of runs" },
-      turn("Later runs", this.first - PAGE),
-      turn("Earlier runs", this.first + PAGE),
-      h("span", { class: "quiet" }, `${this.first + 1} to ${last} of ${this.runs.length}, the latest first`),
+      "nav.row.buttons.start",
+      { "aria-label": "Pages of runs" },
+      turn("Later runs", first - PAGE),
+      turn("Earlier runs", first + PAGE),
+      h("span.quiet", `${first + 1} to ${last} of ${runs.length}, the latest first`),
     );
   }
 
   /** @param {Receipt} run */
-  item(run) {
-    const inside = h("div", { class: "inside" });
+  function item(run) {
+    const inside = h("div.inside");
     const count = run.warnings.length;
     const warned = count > 0 ? `${count} ${count === 1 ? "warning" : "warnings"}` : "";
     const name = run.state === "withdrawn" ? "s" : "span";
-    const details = h(
-      "details",
-      { open: this.open.has(run.run_id), "data-run": run.run_id, class: `run-${run.state}` },
-      h(
-        "summary",
-        {},
-        h(name, { class: "at" }, `${fixed(run.cycles)} cycles`),
-        h(name, {}, nameOf(run)),
-        h("span", {}, stateMark(run) || resultOf(run)),
-        h("span", { class: count > 0 ? "warned" : "quiet" }, warned),
-        h("span", { class: "quiet" }, moment(run.started_at ?? run.received_at)),
-      ),
-      inside,
+    const summary = h(
+      "summary",
+      h(name, { class: "at" }, `${fixed(run.cycles)} cycles`),
+      h(name, nameOf(run)),
+      h("span", stateMark(run) || resultOf(run)),
+      h("span", { class: count > 0 ? "warned" : "quiet" }, warned),
+      h("span.quiet", moment(run.started_at ?? run.received_at)),
     );
-    details.addEventListener("toggle", () => {
-      if (details.open) this.open.add(run.run_id);
-      else this.open.delete(run.run_id);
-      if (details.open && !inside.hasChildNodes()) this.fill(inside, run);
-    });
+    const ontoggle = () => {
+      if (details.open) open.add(run.run_id);
+      else open.delete(run.run_id);
+      if (details.open && !inside.hasChildNodes()) fill(inside, run);
+    };
+    const attributes = { open: open.has(run.run_id), "data-run": run.run_id, class: `run-${run.state}`, ontoggle };
+    const details = h("details", attributes, summary, inside);
     return details;
   }
 
   /** @type {(inside: HTMLElement, run: Receipt) => Promise<void>} */
-  async fill(inside, run) {
-    const charts = h("div", { class: "run-charts" });
-    inside.append(...this.inside(run), charts, ...receipt(run));
-    if (run.kind === "maintenance") return;
-    charts.append((await runCharts(run, this.reader)) ?? "");
+  async function fill(inside, run) {
+    const charts = h("div.run-charts");
+    const changes = buttons(run, done);
+    if (isCorrected(run) && run.state !== "withdrawn") {
+      changes.append(button("Undo the correction …", () => done(askUndo(run))));
+    }
+    inside.append(...statesOf(run), changes, charts, ...receipt(run));
+    if (run.kind !== "maintenance") charts.append((await runCharts(run, reader)) ?? "");
   }
 
-  /** @param {Receipt} run */
-  inside(run) {
-    const changes = buttons(run, this.done);
-    if (isCorrected(run) && run.state !== "withdrawn") {
-      changes.append(button("Undo the correction …", () => this.done(askUndo(run))));
-    }
-    return [
-      run.state === "held" ? h("p", {}, "Held: it does not count until it is confirmed or corrected.") : "",
-      run.state === "withdrawn" ? h("p", {}, "Withdrawn: it does not count.") : "",
-      isCorrected(run)
-        ? h("p", {}, `Sent as ${fixed(run.sent_cycles)} cycles, corrected to ${fixed(run.cycles)}.`)
-        : "",
-      run.doubts.length > 0
-        ? h("div", {}, run.state === "held" ? "" : h("b", {}, "It was held because:"), doubtList(run))
-        : "",
-      changes,
-    ];
+  async function show(/** @type {string} */ runId) {
+    // the run whose part of the list has the focus, which drawing takes away
+    const inside = place.contains(document.activeElement) ? document.activeElement : null;
+    const focused = inside?.closest("details")?.dataset.run;
+    runs = [...(await reader.runs())].reverse();
+    if (runId && runId !== revealed) reveal(runId);
+    else draw();
+    revealed = runId;
+    if (focused !== undefined) summaryOf(focused)?.focus({ preventScroll: true });
   }
+
+  return { show };
+}
+
+/** @param {Receipt[]} runs */
+function countsOf(runs) {
+  const warned = runs.filter((run) => run.warnings.length > 0).length;
+  const [held, withdrawn] = ["held", "withdrawn"].map((state) => runs.filter((run) => run.state === state).length);
+  const parts = [`${runs.length} ${runs.length === 1 ? "run" : "runs"}`, `${warned} with warnings`];
+  if (held > 0) parts.push(`${held} held`);
+  if (withdrawn > 0) parts.push(`${withdrawn} withdrawn`);
+  return `${parts.join(", ")}.`;
+}
+
+/** @type {(run: Receipt) => HTMLElement[]} why a run does not count, or counts otherwise than it was sent */
+function statesOf(run) {
+  const held = run.state === "held";
+  const sent = `Sent as ${fixed(run.sent_cycles)} cycles, corrected to ${fixed(run.cycles)}.`;
+  return [
+    held && h("p", "Held: it does not count until it is confirmed or corrected."),
+    run.state === "withdrawn" && h("p", "Withdrawn: it does not count."),
+    isCorrected(run) && h("p", sent),
+    run.doubts.length > 0 && h("div", !held && h("b", "It was held because:"), doubtList(run)),
+  ].filter((part) => part !== false);
 }
 
 /** @param {Receipt} run */
@@ -194,11 +168,11 @@ function receipt(run) {
     ["SHA-256", run.content_sha256],
     ["Computed by", `version ${run.code_version}`],
   ];
-  const list = facts.flatMap(([name, value]) => [h("dt", {}, name), h("dd", {}, value)]);
+  const list = facts.flatMap(([name, value]) => [h("dt", name), h("dd", value)]);
   return [
     warnings(run.warnings) ?? "",
     run.fits.length > 0 ? fitTable(run.fits) : "",
     run.loops.length > 0 ? loopTable(run.loops) : "",
-    h("dl", { class: "facts" }, list),
+    h("dl.facts", list),
   ];
 }

@@ -70,9 +70,9 @@ export function warningsView(warned) {
           ]
         : `${sentence(message)} `,
     );
-    return h("li", {}, h("b", {}, `${title}. `), sentences.flat(), help && h("span", { class: "quiet" }, help));
+    return h("li", h("b", `${title}. `), sentences.flat(), help && h("span.quiet", help));
   });
-  return h("div", { class: "notice odd" }, h("h2", { class: "hidden" }, "Warnings"), h("ul", {}, items));
+  return h("div.notice.odd", h("h2.hidden", "Warnings"), h("ul", items));
 }
 
 /**
@@ -94,12 +94,11 @@ export function heldView(runs, { done }) {
   const rest = runs.length - MOST_SHOWN;
   const listed = runs.slice(0, MOST_SHOWN).map((run) => item(run, done));
   return h(
-    "div",
-    { class: "notice odd" },
+    "div.notice.odd",
     h("h2", { id: "held-title" }, count),
-    h("p", {}, ABOUT),
+    h("p", ABOUT),
     together(runs, done),
-    h("ul", { class: "held" }, listed),
+    h("ul.held", listed),
     rest > 0 ? quiet(h("a", { href: "#/runs" }, `${rest} more in the list of runs`)) : "",
   );
 }
@@ -112,9 +111,8 @@ function together(runs, done) {
     .filter((alike) => alike.length > 1)
     .map((alike) =>
       h(
-        "div",
-        { class: "buttons start" },
-        h("span", {}, `${alike.length} runs for the same reason:`),
+        "div.row.buttons.start",
+        h("span", `${alike.length} runs for the same reason:`),
         button(`All ${alike.length} are right`, () => done(answerDoubts("right", alike))),
         button(`All ${alike.length} are another clutch’s`, () => done(answerDoubts("other", alike))),
       ),
@@ -128,10 +126,9 @@ function item(run, done) {
   );
   return h(
     "li",
-    {},
-    h("p", {}, h("b", {}, runLink(run)), h("span", { class: "quiet" }, ` · received ${moment(run.received_at)}`)),
+    h("p", h("b", runLink(run)), h("span.quiet", ` · received ${moment(run.received_at)}`)),
     doubtList(run),
-    h("div", { class: "buttons start" }, answers),
+    h("div.row.buttons.start", answers),
     buttons(run, done),
   );
 }
@@ -139,5 +136,5 @@ function item(run, done) {
 /** @type {(run: Receipt, done: Page["done"]) => HTMLElement} what can be done to a run */
 export function buttons(run, done) {
   const each = actionsOf(run).map((action) => button(LABELS[action], () => done(askRun(action, run))));
-  return h("div", { class: "buttons start" }, each);
+  return h("div.row.buttons.start", each);
 }

@@ -179,10 +179,9 @@ function drawForm(lives) {
       });
     return h(
       "li",
-      {},
       h("a", { href: `/clutches/${encodeURIComponent(id)}` }, id),
       " ",
-      life.clutch.held > 0 && h("span", { class: "mark-held" }, heldText(life.clutch.held)),
+      life.clutch.held > 0 && h("span.mark-held", heldText(life.clutch.held)),
       numbers.length > 1 && choice("Life", numbers, `${id}:${life.answer.life.number}`, replace),
       button("Leave out", () => replace(null), { class: "small", "aria-label": `Remove ${life.label}` }),
     );
@@ -193,11 +192,10 @@ function drawForm(lives) {
     go((query) => query.append("clutch", input.value.trim()));
   };
   byId("choices").replaceChildren(
-    h("ul", { class: "compared" }, entries),
-    h("form", { class: "finding", onsubmit: add }, h("label", { for: "add" }, "Add"), input, h("button", {}, "Add")),
+    h("ul.compared", entries),
+    h("form.row.finding", { onsubmit: add }, h("label", { for: "add" }, "Add"), input, h("button", "Add")),
     h(
-      "div",
-      { class: "controls" },
+      "div.row.controls",
       choice(
         "Quantity",
         CHOICES.map((key) => [key, QUANTITIES[key].title]),

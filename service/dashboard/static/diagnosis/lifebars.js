@@ -19,16 +19,15 @@ export function lifeBars({ before, after }, names = ["Before", "After"]) {
   const ends = both.map((q) => q["0.95"] ?? 1.6 * (q["0.5"] ?? q["0.05"] ?? 0));
   const scale = 1.05 * Math.max(1, ...ends);
   const rows = both.flatMap((q, index) => [
-    h("dt", {}, names[index]),
+    h("dt", names[index]),
     h(
       "dd",
-      {},
-      h("b", {}, cycles(q["0.5"], q["0.05"], q["0.95"])),
-      h("span", { class: "quiet" }, ` (90 %: ${interval(q)})`),
+      h("b", cycles(q["0.5"], q["0.05"], q["0.95"])),
+      h("span.quiet", ` (90 %: ${interval(q)})`),
       intervalBar(q, scale),
     ),
   ]);
-  return h("dl", { class: "lifebars" }, rows);
+  return h("dl.lifebars", rows);
 }
 
 /** @type {(answer: Answer) => Quantiles | null} missing quartiles are taken from the 90 % interval */

@@ -33,7 +33,7 @@ const CERTAIN = 0.9;
 export function report(diagnosis) {
   if (diagnosis.status === "failed") {
     const reason = diagnosis.problem ?? "";
-    return [h("p", { class: "notice bad" }, h("b", {}, "The diagnosis failed. "), reason)];
+    return [h("p.notice.bad", h("b", "The diagnosis failed. "), reason)];
   }
   const verdict = diagnosis.verdict ?? "";
   const date = `${moment(diagnosis.created_at)}, of the runs up to ${cycles(diagnosis.as_of_cycles, 0, 20)} cycles.`;
@@ -41,13 +41,12 @@ export function report(diagnosis) {
     h(
       "div",
       { class: `notice ${NOTICES[verdict] ?? ""}` },
-      h("p", { class: "verdict" }, h("b", {}, `${heading(diagnosis)}. `), sentence(diagnosis)),
-      diagnosis.summary ? h("p", {}, diagnosis.summary) : null,
+      h("p.verdict", h("b", `${heading(diagnosis)}. `), sentence(diagnosis)),
+      diagnosis.summary ? h("p", diagnosis.summary) : null,
       quiet(date, outdated(diagnosis)),
     ),
     h(
-      "div",
-      { class: "columns" },
+      "div.columns",
       candidates(diagnosis),
       fitness(diagnosis),
       gain(diagnosis),
@@ -61,8 +60,8 @@ export function report(diagnosis) {
 
 /** @param {DiagnosisOut} diagnosis */
 function outdated({ earlier_life: earlier, stale }) {
-  if (earlier) return h("b", {}, " The clutch was rebuilt after this diagnosis, which concerns the earlier life.");
-  return stale ? h("b", {}, " Runs were added after this diagnosis: start a new one.") : null;
+  if (earlier) return h("b", " The clutch was rebuilt after this diagnosis, which concerns the earlier life.");
+  return stale ? h("b", " Runs were added after this diagnosis: start a new one.") : null;
 }
 
 /**
@@ -97,7 +96,7 @@ export function sentence(diagnosis) {
 }
 
 /** @type {(title: string, ...content: Content[]) => HTMLElement} */
-const part = (title, ...content) => h("div", { class: "part" }, h("h3", {}, title), ...content);
+const part = (title, ...content) => h("div.part", h("h3", title), ...content);
 
 /** @param {DiagnosisOut} diagnosis */
 function candidates({ candidates: all = [], causes = [] }) {
@@ -106,17 +105,12 @@ function candidates({ candidates: all = [], causes = [] }) {
     const { effect, title } = candidate;
     return [
       h("span", { class: causes.includes(effect) ? "named" : null, title: effect }, title || words(effect)),
-      h("span", { class: "chance" }, chance(candidate.probability), probability(candidate.probability)),
+      h("span.chance", chance(candidate.probability), probability(candidate.probability)),
       estimated(candidate),
     ];
   });
   const columns = ["Cause", "Probability", "Estimate"];
-  return h(
-    "div",
-    { class: "part wide" },
-    h("h3", {}, "Candidates"),
-    scrolling("Candidates", table("Candidate causes", columns, rows)),
-  );
+  return h("div.part.wide", h("h3", "Candidates"), scrolling("Candidates", table("Candidate causes", columns, rows)));
 }
 
 /**
@@ -143,8 +137,8 @@ function chance(value) {
   return svg(
     "svg",
     { viewBox: "0 0 60 8", ...size, "aria-hidden": "true" },
-    svg("rect", { class: "axis", ...size, rx: 3 }),
-    svg("rect", { class: "fill", width, height: 8, rx: 3 }),
+    svg("rect.axis", { ...size, rx: 3 }),
+    svg("rect.fill", { width, height: 8, rx: 3 }),
   );
 }
 
@@ -168,7 +162,7 @@ function gain({ gain: gained }) {
   const bars = gained.remaining_useful_life ? lifeBars(gained.remaining_useful_life) : null;
   const error = errorGain(gained);
   if (error === null && bars === null) return null;
-  return part("Gain on runs that were left out of the fit", error, bars && h("h4", {}, "Remaining cycles"), bars);
+  return part("Gain on runs that were left out of the fit", error, bars && h("h4", "Remaining cycles"), bars);
 }
 
 /** @param {GainOut} gained */
@@ -183,7 +177,7 @@ function errorGain(gained) {
   return h(
     "p",
     { title: scores.filter(Boolean).join("; ") || null },
-    h("b", {}, `${fixed(gained.reduction_percent)} % less error`),
+    h("b", `${fixed(gained.reduction_percent)} % less error`),
     ` on ${count} ${count === 1 ? "run that was" : "runs that were"} left out of the fit: ${before} → ${after} Nm RMS.`,
   );
 }
@@ -210,17 +204,17 @@ function advice({ advice: tests = [], clutch_id: clutch, diagnosis_id: name }) {
     const use = narrows
       ? `narrows the size of ${cause} to ${percent(narrows)} of its present uncertainty`
       : `distinguishes ${cause} from ${other === "baseline" ? "no effect at all" : other}`;
-    return h("li", {}, h("b", {}, test), h("span", { class: "quiet" }, `: ${use}`));
+    return h("li", h("b", test), h("span.quiet", `: ${use}`));
   });
-  const choice = tests.length > 1 ? h("p", {}, "One of these is enough; the best comes first.") : null;
+  const choice = tests.length > 1 ? h("p", "One of these is enough; the best comes first.") : null;
   const plan = files(`${clutch}-plan`, `${clutchPath(clutch)}/diagnoses/${name}/plan.csv`);
-  return part("What to test next", choice, h("ol", {}, items), quiet("As a protocol for the rig: ", plan));
+  return part("What to test next", choice, h("ol", items), quiet("As a protocol for the rig: ", plan));
 }
 
 /** @param {DiagnosisOut} diagnosis */
 function notes({ notes: all = [] }) {
-  const items = all.map((note) => h("li", {}, note));
-  return items.length > 0 ? part("Notes", h("ul", {}, items)) : null;
+  const items = all.map((note) => h("li", note));
+  return items.length > 0 ? part("Notes", h("ul", items)) : null;
 }
 
 const VISIBLE =
@@ -238,9 +232,8 @@ function visible({ visible: all = [] }) {
   ]);
   const label = "Smallest visible sizes";
   return h(
-    "details",
-    { class: "part" },
-    h("summary", {}, "What these runs can show"),
+    "details.part",
+    h("summary", "What these runs can show"),
     quiet(VISIBLE),
     scrolling(label, table(label, ["Effect", "For every shape", "For the most visible", "Unit"], rows)),
   );

@@ -2,10 +2,11 @@
 // The section of the measured engagements: their answer of the API goes in, two charts and the choices above them come out:
 // an indicator over the life, and one engagement beside what the tracked model gives for the same pressure and drive.
 
-import { Chart, choice, setControls } from "../charts/chart.js";
+import { Chart, chooser, setControls } from "../charts/chart.js";
 import { column, CYCLES, digitsColumn, HALF_OF_90, KIND } from "../charts/columns.js";
 import { eventMarks } from "../charts/layout.js";
 import { lineOf, measuredLine, titled } from "../charts/traces.js";
+import { stateOptions } from "../quantities/choices.js";
 import { INDICATORS } from "../quantities/names.js";
 import { clutchPath, Problem, read } from "../shared/api.js";
 import { fixed, percent, significant } from "../shared/format.js";
@@ -105,47 +106,31 @@ function optionsOf(named) {
   return names.map((name) => /** @type {[Name, string]} */ ([name, named[name][0]]));
 }
 
-export class Engagements {
-  /**
-   * @param {string} clutchId
-   * @param {() => string} name the start of saved files' names
-   * @param {HTMLElement} place where the charts go
-   */
-  constructor(clutchId, name, place) {
-    this.clutchId = clutchId;
-    this.overLife = new Chart({ name, id: "engagement-indicators", title: "An indicator over cycles", height: 400 });
-    this.trace = new Chart({ name, id: "engagement-trace", title: "An engagement against the model", height: 400 });
-    place.append(this.overLife.element, this.trace.element);
-    this.answer = NOTHING;
-    /** @type {Receipt[]} */
-    this.events = [];
-    /** @type {Indicator} */
-    this.indicator = "stop_time_s";
-    /** @type {Channel} */
-    this.channel = "torque_nm";
-    /** @type {string | undefined} */
-    this.run = undefined;
-  }
+/** @typedef {{ id: string, name: () => string, runs: () => Promise<Receipt[]>, events: () => Promise<Receipt[]> }} Reader of a clutch */
 
-  /**
-   * @param {Receipt[]} runs that count
-   * @param {Receipt[]} events
-   */
-  async show(runs, events) {
-    this.events = events;
-    const evaluated = runs.filter((run) => run.engagement?.status === "determined");
-    if (!evaluated.some((run) => run.run_id === this.run)) this.run = undefined;
-    this.answer = evaluated.length > 0 ? await this.read() : NOTHING;
-    this.drawOverLife();
-    this.drawTrace();
-  }
+/** @type {(place: HTMLElement, reader: Reader) => { show: () => Promise<void> }} */
+export function engagementsTab(place, reader) {
+  const { name } = reader;
+  const overLife = new Chart({ name, id: "engagement-indicators", title: "An indicator over cycles", height: 400 });
+  const trace = new Chart({ name, id: "engagement-trace", title: "An engagement against the model", height: 400 });
+  place.append(overLife.element, trace.element);
+  let answer = NOTHING;
+  /** @type {Receipt[]} */
+  let events = [];
+  /** @type {{ indicator: Indicator, channel: Channel, run?: string }} */
+  const chosen = { indicator: "stop_time_s", channel: "torque_nm" };
+  const choose = chooser(chosen, async (what) => {
+    if (what === "indicator") return drawOverLife();
+    if (what === "run") answer = await ask();
+    drawTrace();
+  });
 
   /** The answer; without a stationary test there is no model and none. */
-  async read() {
-    const run = this.run === undefined ? "" : `?run_id=${encodeURIComponent(this.run)}`;
+  async function ask() {
+    const run = chosen.run === undefined ? "" : `?run_id=${encodeURIComponent(chosen.run)}`;
     try {
       /** @type {{ body: EngagementOut }} */
-      const { body } = await read(`${clutchPath(this.clutchId)}/engagement${run}`);
+      const { body } = await read(`${clutchPath(reader.id)}/engagement${run}`);
       return body;
     } catch (problem) {
       if (problem instanceof Problem && problem.status === 404) return NOTHING;
@@ -153,30 +138,28 @@ export class Engagements {
     }
   }
 
-  drawOverLife() {
-    const { measured } = this.answer;
-    const which = choice("Indicator", optionsOf(INDICATORS), this.indicator, (value) => {
-      this.indicator = value;
-      this.drawOverLife();
-    });
-    setControls(this.overLife, measured.length > 0 ? [which] : []);
-    this.overLife.show(indicatorOverLife({ measured, events: this.events, name: this.indicator }));
+  function drawOverLife() {
+    const { measured } = answer;
+    setControls(overLife, measured.length > 0 ? [choose("indicator", "Indicator", optionsOf(INDICATORS))] : []);
+    overLife.show(indicatorOverLife({ measured, events, name: chosen.indicator }));
   }
 
-  drawTrace() {
-    const { measured, compared } = this.answer;
-    const which = choice("Channel", optionsOf(CHANNELS), this.channel, (value) => {
-      this.channel = value;
-      this.drawTrace();
-    });
-    /** @type {[string, string][]} */
-    const states = measured.map((engagement) => [engagement.run_id, `${fixed(engagement.cycles)} cycles`]);
-    const state = choice("Cycles", states, compared?.run_id, async (value) => {
-      this.run = value;
-      this.answer = await this.read();
-      this.drawTrace();
-    });
-    setControls(this.trace, compared === null ? [] : [which, state]);
-    this.trace.show(engagementTrace({ compared, name: this.channel }));
+  function drawTrace() {
+    const { measured, compared } = answer;
+    const state = choose("run", "Cycles", stateOptions(measured), compared?.run_id);
+    setControls(trace, compared === null ? [] : [choose("channel", "Channel", optionsOf(CHANNELS)), state]);
+    trace.show(engagementTrace({ compared, name: chosen.channel }));
   }
+
+  return {
+    show: async () => {
+      const runs = await reader.runs();
+      events = await reader.events();
+      const evaluated = runs.filter((run) => run.engagement?.status === "determined");
+      if (!evaluated.some((run) => run.run_id === chosen.run)) chosen.run = undefined;
+      answer = evaluated.length > 0 ? await ask() : NOTHING;
+      drawOverLife();
+      drawTrace();
+    },
+  };
 }

@@ -3,7 +3,7 @@
 // first, come out. Searching, filtering and sorting are the service's.
 // Open this file first (what is asked for and shown), then rows.js (which rows are drawn) and row.js (one of them).
 
-import { Alarms } from "../alarms/alarms.js";
+import { alarms } from "../alarms/alarms.js";
 import { register } from "../sending/registration.js";
 import { sender } from "../sending/sending.js";
 import { at } from "../shared/address.js";
@@ -39,7 +39,7 @@ const rows = new Rows(
   () => drawPicked(),
 );
 
-const alarms = new Alarms(byId("tab-alarms"), null);
+const showAlarms = alarms(byId("tab-alarms"), null);
 
 /** What totals and the list are asked for: archived or not, and what is searched for. */
 function wanted() {
@@ -66,10 +66,7 @@ function turn() {
 }
 
 async function poll() {
-  if (turn() === "alarms") {
-    await alarms.show();
-    return;
-  }
+  if (turn() === "alarms") return showAlarms();
   const question = chosen();
   const part = rows.wanted();
   const list = `/v1/clutches?${question}${question && "&"}sort=${SORT.value}&offset=${part.offset}&limit=${part.limit}`;
@@ -88,7 +85,7 @@ function show(counted, items, part) {
   document.getElementById("nothing")?.remove();
   if (counted.all === 0 && !wanted().has("find")) {
     byId("chips").replaceChildren();
-    MAIN.replaceChildren(ARCHIVED.checked ? h("p", { class: "notice" }, "No clutch is archived.") : welcome());
+    MAIN.replaceChildren(ARCHIVED.checked ? h("p.notice", "No clutch is archived.") : welcome());
     return;
   }
   if (!rows.element.isConnected) MAIN.replaceChildren(rows.element);
@@ -120,7 +117,7 @@ function drawPicked() {
   };
   byId("picked").hidden = ids.length === 0;
   byId("picked").replaceChildren(
-    h("b", {}, `${ids.length} chosen`),
+    h("b", `${ids.length} chosen`),
     h("a", { href: `/compare?${query}`, class: "button" }, "Compare"),
     button(ARCHIVED.checked ? "Bring back …" : "Archive …", () => archive(ids)),
     button("Choose none", clear),
@@ -210,7 +207,7 @@ function drawChips(totals, only, choose) {
     const pressed = String(only === name);
     const attributes = { type: "button", class: "chip", "data-state": name ?? "all", "aria-pressed": pressed };
     const icon = name && name !== "held" && stateIcon(name);
-    return h("button", { ...attributes, onclick: () => choose(name) }, icon, h("b", {}, String(count)), ` ${label}`);
+    return h("button", { ...attributes, onclick: () => choose(name) }, icon, h("b", String(count)), ` ${label}`);
   };
   const focused = document.activeElement instanceof HTMLElement ? document.activeElement.dataset.state : undefined;
   const names = /** @type {StateName[]} */ (Object.keys(STATES));

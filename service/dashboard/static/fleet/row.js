@@ -11,7 +11,7 @@ import { heldText, stateIcon, STATES, VERDICTS } from "../shared/state.js";
 /** @import { ClutchOut, ClutchSummary } from "../shared/types.js" */
 
 export const COLUMNS = [
-  h("span", { class: "hidden" }, "Choose"),
+  h("span.hidden", "Choose"),
   "State",
   "Clutch",
   "Health",
@@ -31,18 +31,18 @@ export function row(clutch, { scale, group, chosen, choose }) {
   const box = h("input", { type: "checkbox", checked: chosen, "aria-label": `Choose ${clutch.clutch_id}` });
   box.addEventListener("change", () => choose(box.checked));
   const address = `/clutches/${encodeURIComponent(clutch.clutch_id)}`;
-  const label = h("span", {}, STATES[state.name].word, state.name !== "normal" && small(state.why));
+  const label = h("span", STATES[state.name].word, state.name !== "normal" && small(state.why));
   return h(
     "tr",
     { role: "row", "data-clutch": clutch.clutch_id, class: group === null ? null : "begins" },
     cell("", box),
-    cell("State", h("span", { class: "state" }, stateIcon(state.name), label)),
+    cell("State", h("span.state", stateIcon(state.name), label)),
     h(
       "th",
       { role: "rowheader", scope: "row", "data-label": "Clutch" },
-      group !== null && h("span", { class: "group" }, group),
+      group !== null && h("span.group", group),
       h("a", { href: address }, clutch.clutch_id),
-      clutch.origin === "simulated" && h("span", { class: "tag" }, "simulated"),
+      clutch.origin === "simulated" && h("span.tag", "simulated"),
       small(`${clutch.friction_material} on ${clutch.reaction_plate}`),
     ),
     cell("Health", ...health(summary, state.name)),
@@ -61,9 +61,9 @@ export const kindOf = ({ friction_material: material, reaction_plate: plate, flu
 const cell = (name, ...content) => h("td", { role: "cell", "data-label": name }, ...content);
 
 /** @param {string} text */
-const number = (text) => h("span", { class: "number" }, text);
+const number = (text) => h("span.number", text);
 /** @param {string} text */
-const small = (text) => h("small", {}, text);
+const small = (text) => h("small", text);
 
 /** @type {(summary: ClutchSummary | null, state: StateName) => string[] | (HTMLElement | SVGSVGElement)[]} */
 function health(summary, state) {
@@ -106,8 +106,7 @@ function meanCof({ summary, recent, end_of_life: end }) {
   return [
     sparkline(recent?.mean_cof ?? [], threshold),
     h(
-      "span",
-      { class: "beside" },
+      "span.beside",
       number(fixed(cof, 4)),
       small(share === null ? `at ${fixed(summary?.current.measured_at_cycles)} cycles` : `${percent(share)} of new`),
     ),
@@ -133,7 +132,7 @@ function held({ held: count }, address) {
 
 /** @type {(clutch: ClutchOut, address: string) => HTMLElement[]} */
 function diagnosis({ diagnosis: latest }, address) {
-  if (latest === null) return [h("span", { class: "quiet" }, "not run")];
+  if (latest === null) return [h("span.quiet", "not run")];
   const verdict = latest.verdict ?? "";
   const causes = latest.causes.map(words).join(", ");
   const remarks = [causes, latest.adopted && "adopted", latest.earlier_life && "before the rebuild"];

@@ -36,9 +36,9 @@ export class Rows {
     this.below = space();
     const columns = COLUMNS.map((name) => h("th", { role: "columnheader", scope: "col" }, name));
     this.element = h(
-      "table",
-      { class: "fleet", role: "table" },
-      h("caption", { class: "hidden" }, "Clutches, the lowest safe bound first"),
+      "table.fleet",
+      { role: "table" },
+      h("caption.hidden", "Clutches, the lowest safe bound first"),
       h("thead", { role: "rowgroup" }, h("tr", { role: "row", "aria-rowindex": 1 }, columns)),
       this.above,
       this.body,
@@ -184,4 +184,4 @@ export class Rows {
 }
 
 /** Room for rows that are not drawn. */
-const space = () => h("tbody", { class: "space", "aria-hidden": "true" });
+const space = () => h("tbody.space", { "aria-hidden": "true" });

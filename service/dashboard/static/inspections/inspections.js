@@ -8,12 +8,12 @@ import { CYCLES, digitsColumn, distinct } from "../charts/columns.js";
 import { eventMarks } from "../charts/layout.js";
 import { rampOf } from "../charts/palette.js";
 import { titled } from "../charts/traces.js";
-import { clutchPath, readAll } from "../shared/api.js";
+import { readAll } from "../shared/api.js";
 import { button, h, quiet, scrolling, symbol, table } from "../shared/dom.js";
 import { files } from "../shared/files.js";
 import { fixed, moment, significant } from "../shared/format.js";
-import { InspectionForm } from "./form.js";
-import { Photographs } from "./photographs.js";
+import { inspectionForm } from "./form.js";
+import { gallery } from "./photographs.js";
 
 /** @import { Spec } from "../charts/types.js" */
 /** @import { InspectionOut, Receipt } from "../shared/types.js" */
@@ -37,10 +37,10 @@ const QUANTITIES = {
 /** @type {(lining: string) => string} a lining's name as the charts write it; without one, what it is */
 const nameOf = (lining) => lining.replaceAll("<", "‹") || "lining"; // no markup comes from outside
 
-/** @type {(answers: { inspections: InspectionOut[], events: Receipt[], quantity: SurfaceQuantity }) => Spec} */
-function surfaceOverLife({ inspections, events, quantity }) {
+/** @type {(answers: { items: InspectionOut[], events: Receipt[], quantity: SurfaceQuantity }) => Spec} */
+function surfaceOverLife({ items, events, quantity }) {
   const { title, name, meaning } = QUANTITIES[quantity];
-  const measured = inspections.filter((item) => item[quantity] !== null);
+  const measured = items.filter((item) => item[quantity] !== null);
   if (measured.length === 0) return { empty: `No inspection has measured ${name.split(",")[0]} yet.` };
   const linings = [...new Set(measured.map(({ lining }) => lining))].sort();
   const states = distinct(measured.map(({ cycles }) => cycles)).length;
@@ -71,85 +71,77 @@ function surfaceOverLife({ inspections, events, quantity }) {
 const ABOUT =
   "Roughness and skewness of the lining's surface profile, and photographs of it. They are kept beside the runs: no prediction uses them.";
 
-export class Inspections {
-  /**
-   * @param {HTMLElement} place
-   * @param {string} clutchId
-   * @param {() => string} name the start of saved files' names
-   * @param {(inspection: InspectionOut) => unknown} change asks whether to withdraw an inspection, or to restore it
-   */
-  constructor(place, clutchId, name, change) {
-    this.clutchId = clutchId;
-    this.change = change;
-    this.roughness = new Chart({ name, id: "roughness", title: "Roughness", letter: ["R", "a"], height: 300 });
-    this.skewness = new Chart({ name, id: "skewness", title: "Skewness", letter: ["R", "sk"], height: 300 });
-    this.charts = h("div", { class: "charts", hidden: true }, this.roughness.element, this.skewness.element);
-    this.list = h("div", { class: "inspections" });
-    this.photographs = new Photographs(clutchId);
-    const form = new InspectionForm(clutchId, () => this.poll(this.events));
-    place.replaceChildren(quiet(ABOUT), this.charts, this.list, this.photographs.element);
-    place.append(form.element);
-    /** @type {Receipt[]} */
-    this.events = [];
-    /** @type {InspectionOut[] | null} those that are accepted; null before they are read */
-    this.accepted = null;
-  }
+/**
+ * Reads the list, and draws it where something is another than before, with events as marks in the charts.
+ * @param {HTMLElement} place
+ * @param {{ id: string, path: string, name: () => string }} clutch `name`: the start of saved files' names
+ * @param {(inspection: InspectionOut) => unknown} change asks whether to withdraw an inspection, or to restore it
+ */
+export function inspections(place, { id, path, name }, change) {
+  const base = `${path}/inspections`;
+  const roughness = new Chart({ name, id: "roughness", title: "Roughness", letter: ["R", "a"], height: 300 });
+  const skewness = new Chart({ name, id: "skewness", title: "Skewness", letter: ["R", "sk"], height: 300 });
+  const charts = h("div.charts", { hidden: true }, roughness.element, skewness.element);
+  const list = h("div.inspections");
+  const photographs = gallery(base);
+  place.replaceChildren(
+    quiet(ABOUT),
+    charts,
+    list,
+    photographs.element,
+    inspectionForm(base, () => poll(marks)),
+  );
+  /** @type {Receipt[]} */
+  let marks = [];
+  /** @type {InspectionOut[] | null} those that are accepted; null before they are read */
+  let accepted = null;
 
-  /**
-   * Read the list, and draw it where something is another than before.
-   * @param {Receipt[]} events marks in the charts
-   */
-  async poll(events) {
+  async function poll(/** @type {Receipt[]} */ events) {
     /** @type {{ items: InspectionOut[], changed: boolean }} */
-    const { items, changed } = await readAll(`${clutchPath(this.clutchId)}/inspections?limit=1000`);
-    if (changed || this.accepted === null) {
+    const { items, changed } = await readAll(`${base}?limit=1000`);
+    const anew = changed || accepted === null;
+    if (anew) {
       items.sort((a, b) => a.cycles - b.cycles || a.lining.localeCompare(b.lining));
-      this.list.replaceChildren(...(items.length > 0 ? this.table(items) : [h("p", {}, "No inspection yet.")]));
-      const accepted = items.filter(({ state }) => state === "accepted");
-      this.photographs.show(accepted);
-      this.draw(accepted, events);
-    } else if (events !== this.events) {
-      this.draw(this.accepted, events);
+      list.replaceChildren(...(items.length > 0 ? listed(items) : [h("p", "No inspection yet.")]));
+      accepted = items.filter(({ state }) => state === "accepted");
+      photographs.show(accepted);
     }
+    if (accepted !== null && (anew || events !== marks)) draw(accepted, events);
+    marks = events;
   }
 
-  /** @type {(accepted: InspectionOut[], events: Receipt[]) => void} */
-  draw(accepted, events) {
-    this.accepted = accepted;
-    this.events = events;
-    this.charts.hidden = accepted.every((item) => item.roughness_um === null && item.skewness === null);
-    this.roughness.show(surfaceOverLife({ inspections: accepted, events, quantity: "roughness_um" }));
-    this.skewness.show(surfaceOverLife({ inspections: accepted, events, quantity: "skewness" }));
+  /** @type {(own: InspectionOut[], events: Receipt[]) => void} */
+  function draw(own, events) {
+    charts.hidden = own.every((item) => item.roughness_um === null && item.skewness === null);
+    roughness.show(surfaceOverLife({ items: own, events, quantity: "roughness_um" }));
+    skewness.show(surfaceOverLife({ items: own, events, quantity: "skewness" }));
   }
 
   /** @param {InspectionOut[]} items */
-  table(items) {
-    const rows = items.map((item) => this.row(item));
-    const roughness = h("span", {}, symbol("R", "a"), ", µm");
-    const measured = [roughness, symbol("R", "sk")];
+  function listed(items) {
+    const measured = [h("span", symbol("R", "a"), ", µm"), symbol("R", "sk")];
     const columns = ["Duty cycles", "Inspected", "Lining", ...measured, "Note", "Photographs", "Change"];
-    return [
-      quiet(files(`${this.clutchId}-inspections`, `${clutchPath(this.clutchId)}/inspections.csv`)),
-      h("div", { class: "panel" }, scrolling("Inspections", table("Inspections, by duty cycles", columns, rows))),
-    ];
+    const all = table("Inspections, by duty cycles", columns, items.map(row));
+    return [quiet(files(`${id}-inspections`, `${base}.csv`)), h("div.panel", scrolling("Inspections", all))];
   }
 
   /** @param {InspectionOut} item */
-  row(item) {
+  function row(item) {
     const withdrawn = item.state === "withdrawn";
     const cycles = fixed(item.cycles);
-    const mark = h("span", { class: "mark-withdrawn" }, "withdrawn");
+    const mark = h("span.mark-withdrawn", "withdrawn");
     const label = `${withdrawn ? "Restore" : "Withdraw"} the inspection at ${cycles} cycles`;
-    const onclick = () => this.change(item);
     return [
-      withdrawn ? [h("s", {}, cycles), " ", mark] : cycles,
+      withdrawn ? [h("s", cycles), " ", mark] : cycles,
       item.performed_at === null ? "–" : moment(item.performed_at),
       item.lining || "–",
       significant(item.roughness_um),
       significant(item.skewness),
       item.note || "–",
       String(item.photographs.length),
-      button(withdrawn ? "Restore …" : "Withdraw …", onclick, { class: "small", "aria-label": label }),
+      button(withdrawn ? "Restore …" : "Withdraw …", () => change(item), { class: "small", "aria-label": label }),
     ];
   }
+
+  return poll;
 }

@@ -3,7 +3,7 @@
 // when they come to the screen, one after the other, and kept by the browser: a photograph never changes. Of each the page
 // keeps a drawing as small as its thumbnail, and the whole of one while it is open.
 
-import { clutchPath, readFile } from "../shared/api.js";
+import { readFile } from "../shared/api.js";
 import { answered, button, h } from "../shared/dom.js";
 import { fixed } from "../shared/format.js";
 
@@ -28,94 +28,87 @@ async function drawn(file) {
   return canvas;
 }
 
-export class Photographs {
-  /** @param {string} clutchId */
-  constructor(clutchId) {
-    this.base = `${clutchPath(clutchId)}/inspections`;
-    this.element = h("div", { class: "photographs" });
-    /** @type {Map<string, HTMLCanvasElement>} the drawings that are shown, by path */
-    this.drawings = new Map();
-    /** what is being read and drawn: a photograph at a time, as one of 24 megapixels takes 100 MB while it is drawn */
-    this.queue = Promise.resolve();
-    /** @type {Map<Element, Shown>} */
-    this.waiting = new Map();
-    this.visibility = new IntersectionObserver(
-      (entries) => {
-        for (const { target, isIntersecting } of entries) if (isIntersecting) this.want(target);
-      },
-      { rootMargin: "300px" },
-    );
-  }
-
-  /** @param {InspectionOut[]} inspections by cycles */
-  show(inspections) {
-    this.visibility.disconnect();
-    this.waiting.clear();
-    const shown = inspections.filter(({ photographs }) => photographs.length > 0);
-    this.element.replaceChildren(...shown.map((inspection) => this.state(inspection)));
-    for (const [path, drawing] of this.drawings) if (!drawing.isConnected) this.drawings.delete(path);
-  }
+/** @type {(base: string) => { element: HTMLElement, show: (inspections: InspectionOut[]) => void }} `base`: the inspections' path; shown by cycles */
+export function gallery(base) {
+  const element = h("div.row.photographs");
+  /** @type {Map<string, HTMLCanvasElement>} the drawings that are shown, by path */
+  const drawings = new Map();
+  // what is being read and drawn: a photograph at a time, as one of 24 megapixels takes 100 MB while it is drawn
+  let queue = Promise.resolve();
+  /** @type {Map<Element, Shown>} */
+  const waiting = new Map();
+  const visibility = new IntersectionObserver(
+    (entries) => {
+      for (const { target, isIntersecting } of entries) {
+        if (!isIntersecting) continue;
+        visibility.unobserve(target);
+        queue = queue.then(() => draw(target));
+      }
+    },
+    { rootMargin: "300px" },
+  );
 
   /** @param {InspectionOut} inspection */
-  state({ inspection_id: id, cycles, lining, photographs }) {
-    const state = `${fixed(cycles)} cycles${lining ? `, ${lining}` : ""}`;
+  function state({ inspection_id: id, cycles, lining, photographs }) {
+    const place = `${fixed(cycles)} cycles${lining ? `, ${lining}` : ""}`;
     const thumbnails = photographs.map((photograph, index) => {
-      const path = `${this.base}/${id}/photographs/${photograph.photograph_id}`;
-      return this.thumbnail({ path, text: `Photograph ${index + 1} of ${photographs.length} at ${state}` });
+      const path = `${base}/${id}/photographs/${photograph.photograph_id}`;
+      return thumbnail({ path, text: `Photograph ${index + 1} of ${photographs.length} at ${place}` });
     });
-    return h("figure", {}, h("figcaption", {}, `At ${state}`), h("div", { class: "thumbnails" }, thumbnails));
+    return h("figure", h("figcaption", `At ${place}`), h("div.row.thumbnails", thumbnails));
   }
 
   /** @param {Shown} photograph */
-  thumbnail(photograph) {
-    const open = () => this.open(photograph);
-    const label = `${photograph.text}: show it larger`;
-    const button = h("button", { type: "button", class: "thumbnail", "aria-label": label, onclick: open });
-    const drawing = this.drawings.get(photograph.path);
-    if (drawing !== undefined) {
-      button.append(drawing);
-    } else {
-      this.waiting.set(button, photograph);
-      this.visibility.observe(button);
+  function thumbnail(photograph) {
+    const drawing = drawings.get(photograph.path);
+    const attributes = { class: "thumbnail", "aria-label": `${photograph.text}: show it larger` };
+    const made = button(drawing, () => open(photograph), attributes);
+    if (drawing === undefined) {
+      waiting.set(made, photograph);
+      visibility.observe(made);
     }
-    return button;
+    return made;
   }
 
-  /** @param {Element} button */
-  want(button) {
-    this.visibility.unobserve(button);
-    this.queue = this.queue.then(() => this.draw(button));
-  }
-
-  /** @param {Element} button */
-  async draw(button) {
-    const photograph = this.waiting.get(button); // none where it is shown no more
+  /** @param {Element} place */
+  async function draw(place) {
+    const photograph = waiting.get(place); // none where it is shown no more
     if (photograph === undefined) return;
     const { path } = photograph;
     try {
-      const drawing = this.drawings.get(path) ?? (await drawn(await readFile(path)));
-      button.replaceChildren(drawing);
-      this.drawings.set(path, drawing);
+      const drawing = drawings.get(path) ?? (await drawn(await readFile(path)));
+      place.replaceChildren(drawing);
+      drawings.set(path, drawing);
     } catch {
-      button.replaceChildren("could not be read");
+      place.replaceChildren("could not be read");
     }
   }
 
-  /** @param {Shown} photograph */
-  async open({ path, text }) {
-    const dialog = h("dialog", { class: "photograph", "aria-labelledby": "photograph-title" });
-    const close = button("Close", () => dialog.close(), { class: "main" });
-    const image = h("img", { alt: text });
-    let address = "";
-    dialog.append(h("h2", { id: "photograph-title" }, text), image, h("div", { class: "buttons" }, close));
-    void answered(dialog, () => URL.revokeObjectURL(address));
-    try {
-      const file = await readFile(path);
-      if (!dialog.open) return;
-      address = URL.createObjectURL(file);
-      image.src = address;
-    } catch {
-      image.replaceWith(h("p", { class: "notice bad", role: "alert" }, "The photograph could not be read."));
-    }
+  return {
+    element,
+    show: (inspections) => {
+      visibility.disconnect();
+      waiting.clear();
+      element.replaceChildren(...inspections.filter(({ photographs }) => photographs.length > 0).map(state));
+      for (const [path, drawing] of drawings) if (!drawing.isConnected) drawings.delete(path);
+    },
+  };
+}
+
+/** @param {Shown} photograph */
+async function open({ path, text }) {
+  const dialog = h("dialog.photograph", { "aria-labelledby": "photograph-title" });
+  const close = button("Close", () => dialog.close(), { class: "main" });
+  const image = h("img", { alt: text });
+  let address = "";
+  dialog.append(h("h2", { id: "photograph-title" }, text), image, h("div.row.buttons", close));
+  void answered(dialog, () => URL.revokeObjectURL(address));
+  try {
+    const file = await readFile(path);
+    if (!dialog.open) return;
+    address = URL.createObjectURL(file);
+    image.src = address;
+  } catch {
+    image.replaceWith(h("p.notice.bad", { role: "alert" }, "The photograph could not be read."));
   }
 }

@@ -79,12 +79,12 @@ export function criteriaTable({ criteria }) {
   if (criteria.length === 0) return [];
   if (criteria.length === 1) {
     const [only] = criteria;
-    return [h("p", { class: "limits" }, h("b", {}, "What limits first: "), `${placeText(only)}, ${limitText(only)}.`)];
+    return [h("p.limits", h("b", "What limits first: "), `${placeText(only)}, ${limitText(only)}.`)];
   }
   const ordered = [...criteria].sort((a, b) => b.probability_first - a.probability_first);
   const rows = ordered.map((criterion) => [...criterionRow(criterion), probability(criterion.probability_first)]);
   const caption = scrolling("What limits first", table("What limits first", COLUMNS, rows));
-  return [h("div", { class: "panel limits" }, h("h3", {}, "What limits first"), caption)];
+  return [h("div.panel.limits", h("h3", "What limits first"), caption)];
 }
 
 /**

@@ -1,10 +1,10 @@
 // @ts-check
 // Remaining life by any tracked quantity: a choice of quantity and pressure, answered when it is made. Nothing is stored.
 
-import { choice, setControls } from "../charts/chart.js";
+import { chooser, setControls } from "../charts/chart.js";
 import { distinct } from "../charts/columns.js";
 import { PARAMETER_NAMES } from "../charts/parameters.js";
-import { clutchPath, Problem, read } from "../shared/api.js";
+import { Problem, read } from "../shared/api.js";
 import { h, quiet, scrolling, table } from "../shared/dom.js";
 import { cycles, interval } from "../shared/format.js";
 import { problemView } from "../shared/problem_view.js";
@@ -22,7 +22,10 @@ const OF_LOOPS = LAG_NAMES;
 const ABOUT =
   "When another quantity reaches its limit. The limit is the clutch's own criterion for this quantity. If there is none, the " +
   "limit is the same share of the initial value as for mean COF; for a slope, the limit is 0 at 100 rpm.";
-const ALL = "all";
+/** @type {["all", string][]} */
+const ALL = [["all", "all pressures"]];
+/** @type {[string, string][]} */
+const NAMES = Object.entries(QUANTITIES).map(([name, { title }]) => [name, title]);
 
 /**
  * The levels that a quantity is tracked at, bar; none for those that have no pressure of their own.
@@ -50,88 +53,67 @@ export function remainingTable(criteria) {
   );
 }
 
-export class RemainingBy {
-  /**
-   * @param {HTMLElement} place
-   * @param {string} clutchId
-   */
-  constructor(place, clutchId) {
-    this.address = `${clutchPath(clutchId)}/remaining-useful-life`;
-    this.controls = h("div", { class: "controls" });
-    this.answer = h("div", { class: "answer", "aria-live": "polite" });
-    this.details = h(
-      "details",
-      { class: "planned", ontoggle: () => this.ask() },
-      h("summary", {}, "Remaining life by another quantity"),
-      quiet(ABOUT),
-      this.controls,
-      this.answer,
-    );
-    place.append(this.details);
-    /** @type {{ tests: StribeckItem[], loops: LoopItem[] }} */
-    this.answers = { tests: [], loops: [] };
-    this.readLoops = async () => /** @type {LoopItem[]} */ ([]);
-    this.name = "static_torque_nm";
-    /** @type {number | undefined} bar; undefined: over all pressures, or the usual one */
-    this.level = undefined;
-    this.request = "";
-    this.revision = 0;
-  }
+/**
+ * What is called with the clutch's life and tests whenever they are read.
+ * @param {HTMLElement} place
+ * @param {{ path: string, loops: () => Promise<LoopItem[]> }} reader of the clutch
+ */
+export function remainingBy(place, reader) {
+  const controls = h("div.row.controls");
+  const answer = h("div.answer", { "aria-live": "polite" });
+  const title = h("summary", "Remaining life by another quantity");
+  const details = h("details.planned", { ontoggle: () => ask() }, title, quiet(ABOUT), controls, answer);
+  place.append(details);
+  /** @type {{ tests: StribeckItem[], loops: LoopItem[] }} */
+  const answers = { tests: [], loops: [] };
+  /** @type {{ name: string, level?: number | "all" }} bar */
+  const chosen = { name: "static_torque_nm" };
+  const choose = chooser(chosen, () => {
+    draw();
+    ask();
+  });
+  let request = "";
+  let revision = 0;
 
-  /** @param {{ life: RemainingLife, tests: StribeckItem[], loops: () => Promise<LoopItem[]> }} answers */
-  show({ life, tests, loops }) {
-    this.answers = { ...this.answers, tests };
-    this.readLoops = loops;
-    this.revision = life.revision;
-    this.draw();
-    this.ask();
-  }
-
-  draw() {
-    const levels = levelsAt(this.name, this.answers);
-    const whole = this.name === "mean_cof";
-    const chosen = this.level !== undefined && levels.includes(this.level);
-    if (!chosen) this.level = whole ? undefined : usual(levels);
-    /** @type {[string, string][]} */
-    const names = Object.entries(QUANTITIES).map(([name, { title }]) => [name, title]);
-    const quantity = choice("Quantity", names, this.name, (name) => this.choose(name, this.level));
-    /** @type {[string | number, string][]} */
-    const options = whole ? [[ALL, "all pressures"], ...levelOptions(levels)] : levelOptions(levels);
-    const pressure = choice("Pressure", options, this.level ?? ALL, (level) =>
-      this.choose(this.name, typeof level === "number" ? level : undefined),
-    );
-    setControls(this, options.length > 0 ? [quantity, pressure] : [quantity]);
-  }
-
-  /** @type {(name: string, level: number | undefined) => void} `level`: bar */
-  choose(name, level) {
-    this.name = name;
-    this.level = level;
-    this.draw();
-    this.ask();
+  function draw() {
+    const levels = levelsAt(chosen.name, answers);
+    const whole = chosen.name === "mean_cof";
+    if (typeof chosen.level !== "number" || !levels.includes(chosen.level))
+      chosen.level = whole ? "all" : usual(levels);
+    /** @type {[number | "all", string][]} */
+    const options = [...(whole ? ALL : []), ...levelOptions(levels)];
+    const pressure = options.length > 0 ? [choose("level", "Pressure", options)] : [];
+    setControls({ controls }, [choose("name", "Quantity", NAMES), ...pressure]);
   }
 
   /** The answer to what is chosen, where it is looked at and not there yet. */
-  async ask() {
-    if (this.details.open && OF_LOOPS.includes(this.name)) {
-      this.answers.loops = await this.readLoops();
-      this.draw();
+  async function ask() {
+    if (details.open && OF_LOOPS.includes(chosen.name)) {
+      answers.loops = await reader.loops();
+      draw();
     }
-    const place = this.level === undefined ? "" : `&pressure_bar=${this.level}`;
-    const query = `quantity=${this.name}${place}`;
-    const wanted = `${this.revision} ${query}`;
-    if (!this.details.open || wanted === this.request) return;
-    this.request = wanted;
-    this.answer.replaceChildren(quiet("Being computed …"));
+    const place = typeof chosen.level === "number" ? `&pressure_bar=${chosen.level}` : "";
+    const query = `quantity=${chosen.name}${place}`;
+    const wanted = `${revision} ${query}`;
+    if (!details.open || wanted === request) return;
+    request = wanted;
+    answer.replaceChildren(quiet("Being computed …"));
     try {
       /** @type {{ body: RemainingLife }} */
-      const { body } = await read(`${this.address}?${query}`);
-      if (wanted === this.request) this.answer.replaceChildren(remainingTable(body.criteria));
+      const { body } = await read(`${reader.path}/remaining-useful-life?${query}`);
+      if (wanted === request) answer.replaceChildren(remainingTable(body.criteria));
     } catch (problem) {
       if (!(problem instanceof Problem)) throw problem;
-      if (wanted !== this.request) return;
-      this.request = ""; // it is asked for again when the clutch changes or another choice is made
-      this.answer.replaceChildren(problemView(problem, "No prediction. "));
+      if (wanted !== request) return;
+      request = ""; // it is asked for again when the clutch changes or another choice is made
+      answer.replaceChildren(problemView(problem, "No prediction. "));
     }
   }
+
+  return (/** @type {RemainingLife} */ life, /** @type {StribeckItem[]} */ tests) => {
+    answers.tests = tests;
+    revision = life.revision;
+    draw();
+    ask();
+  };
 }

@@ -35,14 +35,9 @@ export class Importer {
     // what was typed stays when the rest is drawn again
     this.name = h("input", { id: `rig-${number}`, autocomplete: "off", spellcheck: "false" });
     this.pattern = h("input", { id: `pattern-${number}`, autocomplete: "off" });
-    this.lead = h("p", { class: "quiet", role: "status" }, "Reading …");
-    this.content = h("div", {});
-    this.element = h(
-      "details",
-      { class: "import" },
-      h("summary", {}, "Columns, units, and what is fitted"),
-      this.content,
-    );
+    this.lead = h("p.quiet", { role: "status" }, "Reading …");
+    this.content = h("div");
+    this.element = h("details.import", h("summary", "Columns, units, and what is fitted"), this.content);
     for (const input of [run.kind, run.cycles]) input.addEventListener("change", () => this.look());
   }
 
@@ -97,7 +92,7 @@ export class Importer {
     const focused = document.activeElement?.id;
     const left = shown.missing.map(quantity).join(", ");
     const state = shown.problem ?? (left ? `Still missing: ${left}.` : "Ready to send.");
-    this.lead.replaceChildren(this.rig === null ? "" : h("b", {}, `Read by the rig profile ${this.rig}. `), state);
+    this.lead.replaceChildren(this.rig === null ? "" : h("b", `Read by the rig profile ${this.rig}. `), state);
     this.element.open ||= shown.problem !== null || this.channelsLack();
     this.content.replaceChildren(this.columns(shown), this.options(shown), drawing(shown) ?? "");
     const noted = warnings(shown.warnings);
@@ -112,121 +107,87 @@ export class Importer {
 
   /** @param {Preview} shown */
   columns({ columns, first_rows: rows, units }) {
-    const names = Object.keys(units);
-    /** @type {(name: string, cells: Content[]) => HTMLElement} */
-    const line = (name, cells) =>
-      h(
-        "tr",
-        {},
-        h("th", { scope: "row" }, name),
-        cells.map((cell) => h("td", {}, cell)),
-      );
-    const titles = columns.map(({ title }) => h("th", { scope: "col" }, title));
+    /** @type {(name: string, cell: (column: PreviewColumn, index: number) => Content) => HTMLElement} */
+    const line = (name, cell) => {
+      const cells = columns.map((column, index) => h("td", cell(column, index)));
+      return h("tr", h("th", { scope: "row" }, name), cells);
+    };
     const choices = [
-      line(
-        "Channel",
-        columns.map((column, index) => this.channel(column, index, names)),
-      ),
-      line(
-        "Unit",
-        columns.map((column, index) => this.unit(column, index, units[column.channel ?? ""] ?? [])),
-      ),
-      .../** @type {const} */ (["scale", "offset"]).map((name) =>
-        line(
-          words(name),
-          columns.map((column, index) => this.number_(column, index, name)),
-        ),
-      ),
+      line("Channel", (column, index) => this.channel(column, index, Object.keys(units))),
+      line("Unit", (column, index) => this.unit(column, index, units[column.channel ?? ""] ?? [])),
+      line("Scale", (column, index) => this.factor(column, index, "scale")),
+      line("Offset", (column, index) => this.factor(column, index, "offset")),
     ];
-    const shown = rows.slice(0, ROWS).map((row, index) =>
-      line(
-        `Row ${index + 1}`,
-        columns.map((_, at) => row[at] ?? ""),
-      ),
-    );
-    const grid = h(
-      "table",
-      { class: "columns" },
-      h("caption", { class: "hidden" }, `First rows of ${this.file.name}`),
-      h("thead", {}, h("tr", {}, h("th", { scope: "row" }, "Column"), titles)),
-      h("tbody", {}, choices, shown),
-    );
-    return scrolling("First rows", grid);
+    const first = rows.slice(0, ROWS).map((row, index) => line(`Row ${index + 1}`, (_, at) => row[at] ?? ""));
+    const titles = columns.map(({ title }) => h("th", { scope: "col" }, title));
+    const caption = h("caption.hidden", `First rows of ${this.file.name}`);
+    const head = h("thead", h("tr", h("th", { scope: "row" }, "Column"), titles));
+    return scrolling("First rows", h("table.columns", caption, head, h("tbody", choices, first)));
   }
 
   /** @type {(column: PreviewColumn, index: number, channels: string[]) => HTMLElement} */
-  channel({ title, channel, in_part: inPart }, index, channels) {
-    const options = channels.map((name) => h("option", { value: name, selected: name === channel }, quantity(name)));
-    const label = { id: this.id(index, "channel"), "aria-label": `Channel of ${title}` };
-    const choose = (/** @type {any} */ event) => {
-      const value = event.target.value || null;
-      this.choose((columns) => {
-        for (const other of columns) if (other.channel === value) Object.assign(other, { channel: null, unit: null });
-        Object.assign(columns[index], { channel: value, unit: null, stated: null });
-      });
-    };
-    const select = h("select", { ...label, onchange: choose }, h("option", { value: "" }, "left out"), options);
-    return h("div", {}, select, inPart ? h("p", {}, "Check: its title was recognised only in part.") : null);
+  channel(column, index, channels) {
+    const options = channels.map((name) => /** @type {[string, string]} */ ([name, quantity(name)]));
+    const attributes = this.cell(column, index, "channel", (value, columns) => {
+      for (const other of columns) if (other.channel === value) Object.assign(other, { channel: null, unit: null });
+      return { channel: /** @type {RigColumn["channel"]} */ (value), unit: null, stated: null };
+    });
+    const list = select(attributes, [["", "left out"], ...options], column.channel ?? "");
+    return h("div", list, column.in_part ? h("p", "Check: its title was recognised only in part.") : null);
   }
 
   /** @type {(column: PreviewColumn, index: number, units: string[]) => HTMLSelectElement | string} */
-  unit({ title, channel, unit, stated_unit: stated }, index, units) {
+  unit(column, index, units) {
+    const { channel, unit, stated_unit: stated } = column;
     if (channel === null) return stated ?? "";
     const names = unit !== null && !units.includes(unit) ? [unit, ...units] : units;
     const options = names.map((name) => /** @type {[string, string]} */ ([name, name]));
-    const label = { id: this.id(index, "unit"), "aria-label": `Unit of ${title}` };
-    const choose = (/** @type {any} */ event) =>
-      this.choose((columns) => Object.assign(columns[index], { unit: event.target.value || null, stated }));
     if (unit === null) options.unshift(["", "choose …"]);
-    return select({ ...label, onchange: choose }, options, unit);
+    return select(
+      this.cell(column, index, "unit", (value) => ({ unit: value, stated })),
+      options,
+      unit,
+    );
   }
 
   /** @type {(column: PreviewColumn, index: number, name: "scale" | "offset") => HTMLInputElement | string} */
-  number_(column, index, name) {
+  factor(column, index, name) {
     if (column.channel === null) return "";
-    const label = { id: this.id(index, name), "aria-label": `${words(name)} of ${column.title}` };
-    const choose = (/** @type {any} */ event) =>
-      this.choose((columns) => Object.assign(columns[index], { [name]: Number(event.target.value) }));
-    return h("input", { ...label, type: "number", step: "any", required: true, value: column[name], onchange: choose });
+    const attributes = this.cell(column, index, name, (value) => ({ [name]: Number(value) }));
+    return h("input", { ...attributes, type: "number", step: "any", required: true, value: column[name] });
   }
 
-  /** @type {(index: number, name: string) => string} */
-  id(index, name) {
-    return `import-${this.number}-${name}-${index}`;
+  /**
+   * Of what is chosen of a column; `change` gives what the profile then says of it.
+   * @param {PreviewColumn} column
+   * @param {number} index
+   * @param {string} name
+   * @param {(value: string | null, columns: RigColumn[]) => Partial<RigColumn>} change
+   */
+  cell({ title }, index, name, change) {
+    const onchange = (/** @type {any} */ event) =>
+      this.edit(({ columns }) => Object.assign(columns[index], change(event.target.value || null, columns)));
+    return { id: `import-${this.number}-${name}-${index}`, "aria-label": `${words(name)} of ${title}`, onchange };
   }
 
   /** @param {Preview} shown */
   options({ profile, tables }) {
-    const { number } = this;
-    const choose = (/** @type {"decimal" | "table"} */ name) => (/** @type {any} */ event) =>
-      this.edit((edited) => Object.assign(edited, { [name]: event.target.value || null }));
-    const marks = Object.entries({ "": "found", ",": "comma: 1.234,5", ".": "point: 1,234.5" });
-    const mark = { id: `decimal-${number}`, onchange: choose("decimal") };
-    const sheets = ["", ...tables].map((name) => /** @type {[string, string]} */ ([name, name || "the only one"]));
-    const sheet = { id: `table-${number}`, onchange: choose("table") };
-    const missing = h("input", {
-      id: `missing-${number}`,
-      value: profile.missing ?? "",
-      autocomplete: "off",
-      onchange: (/** @type {any} */ event) =>
-        this.edit((edited) => Object.assign(edited, { missing: event.target.value.trim() || null })),
+    const attributes = (/** @type {"decimal" | "table" | "missing"} */ name) => ({
+      id: `${name}-${this.number}`,
+      onchange: (/** @type {any} */ event) => {
+        const { value } = event.target; // a sheet's name may end in a space
+        this.edit((edited) => Object.assign(edited, { [name]: (name === "missing" ? value.trim() : value) || null }));
+      },
     });
+    const marks = Object.entries({ "": "found", ",": "comma: 1.234,5", ".": "point: 1,234.5" });
+    const sheets = ["", ...tables].map((name) => /** @type {[string, string]} */ ([name, name || "the only one"]));
+    const missing = h("input", { ...attributes("missing"), value: profile.missing ?? "", autocomplete: "off" });
     return h(
-      "div",
-      { class: "fields" },
-      field(select(mark, marks, profile.decimal ?? ""), "Decimal mark"),
-      field(
-        missing,
-        "Missing values",
-        h("small", {}, "for example -9999, n/a; “none” if every number is a measurement"),
-      ),
-      tables.length > 1 && field(select(sheet, sheets, profile.table ?? ""), "Sheet or test"),
+      "div.fields",
+      field(select(attributes("decimal"), marks, profile.decimal ?? ""), "Decimal mark"),
+      field(missing, "Missing values", h("small", "for example -9999, n/a; “none” if every number is a measurement")),
+      tables.length > 1 && field(select(attributes("table"), sheets, profile.table ?? ""), "Sheet or test"),
     );
-  }
-
-  /** @param {(columns: RigColumn[]) => unknown} change */
-  choose(change) {
-    this.edit(({ columns }) => change(columns));
   }
 
   /** @param {(profile: RigProfile) => unknown} change */
@@ -259,14 +220,12 @@ export class Importer {
     };
     const ready = problem === null && !this.channelsLack() && !missing.includes("kind");
     return h(
-      "fieldset",
-      { class: "saving" },
-      h("legend", {}, "Read the next file the same way"),
+      "fieldset.saving",
+      h("legend", "Read the next file the same way"),
       h(
-        "div",
-        { class: "fields" },
+        "div.fields",
         field(name, "Name of the rig"),
-        field(pattern, "File names", h("small", {}, "{cycles} stands for the duty cycles, * for any other text")),
+        field(pattern, "File names", h("small", "{cycles} stands for the duty cycles, * for any other text")),
       ),
       button("Save as rig profile", save, { disabled: !ready }),
       answer,
@@ -291,9 +250,9 @@ function drawing({ channels, pieces, fits, kind }) {
   const points = along.map((at, index) => `${x(at)},${(HEIGHT - Number(y(torque[index]))).toFixed(1)}`);
   const cut = pieces.map(({ start_s: start, stop_s: stop }) => {
     const width = Math.max(1, Number(x(stop)) - Number(x(start)));
-    return svg("rect", { class: "cut", x: x(start), y: 0, width, height: HEIGHT });
+    return svg("rect.cut", { x: x(start), y: 0, width, height: HEIGHT });
   });
-  const line = time ? svg("polyline", { class: "record", points: points.join(" ") }) : null;
+  const line = time ? svg("polyline.record", { points: points.join(" ") }) : null;
   const dots = time
     ? []
     : points.map((point) => svg("circle", { cx: point.split(",")[0], cy: point.split(",")[1], r: 2 }));
@@ -304,10 +263,9 @@ function drawing({ channels, pieces, fits, kind }) {
   ];
   const text = `Torque over ${time ? "time" : "speed"}: ${parts.join(", ")}.`;
   return h(
-    "figure",
-    { class: "cutting" },
+    "figure.cutting",
     svg("svg", { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, role: "img", "aria-label": text }, cut, line, dots),
-    h("figcaption", {}, text),
+    h("figcaption", text),
   );
 }
 

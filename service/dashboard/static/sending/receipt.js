@@ -21,28 +21,27 @@ export function outcomeOf(receipt) {
   const held = state === "held";
   const result = duplicate ? "Stored before; nothing has changed" : held ? "Stored and held" : "Stored";
   const run = ` · ${kindName(kind)} at ${cycles(at, 0, 20)} cycles · `;
-  const name = h("p", {}, h("b", {}, result), run, h("code", {}, runId));
-  if (state === "accepted") return h("div", { class: "notice good" }, name);
+  const name = h("p", h("b", result), run, h("code", runId));
+  if (state === "accepted") return h("div.notice.good", name);
   const close = (/** @type {Event} */ event) => {
     if (event.target instanceof Element) event.target.closest("dialog")?.close();
   };
   const [words, section, change] = UNCOUNTED[state];
   const link = h("a", { href: `/clutches/${encodeURIComponent(clutchId)}${section}`, onclick: close }, change);
-  return h("div", { class: "notice odd" }, name, held && doubtList(receipt), h("p", {}, words, link));
+  return h("div.notice.odd", name, held && doubtList(receipt), h("p", words, link));
 }
 
 /** @type {(receipt: Receipt) => HTMLElement} why a run is held, or was */
 export function doubtList({ doubts }) {
-  const items = doubts.map(({ message }) => h("li", {}, sentence(message)));
-  return h("ul", { class: "doubts" }, items);
+  const items = doubts.map(({ message }) => h("li", sentence(message)));
+  return h("ul.doubts", items);
 }
 
 /** @type {(receipt: Receipt) => Promise<HTMLElement>} a receipt with the curve that was fitted */
 export async function receiptView(receipt) {
   const fitted = receipt.fits.length > 0;
   return h(
-    "div",
-    { class: "receipt" },
+    "div.receipt",
     warnings(receipt.warnings),
     fitted && (await drawing(receipt)),
     fitted && fitTable(receipt.fits),
@@ -53,8 +52,8 @@ export async function receiptView(receipt) {
 /** @param {Warned[]} warned */
 export function warnings(warned) {
   if (warned.length === 0) return null;
-  const items = warned.map(({ code, message }) => h("li", {}, h("b", {}, words(code)), " ", message));
-  return h("ul", { class: "warnings" }, items);
+  const items = warned.map(({ code, message }) => h("li", h("b", words(code)), " ", message));
+  return h("ul.warnings", items);
 }
 
 const FIT_COLUMNS = () => [
@@ -63,7 +62,7 @@ const FIT_COLUMNS = () => [
   [symbol("M", "s"), ", Nm"],
   symbol("M̄", "c"),
   [symbol("V", "S"), ", m/s"],
-  [symbol("C", "v"), ", Nm/(m/s)", h("sup", {}, "0.3")],
+  [symbol("C", "v"), ", Nm/(m/s)", h("sup", "0.3")],
   "RMSE, Nm",
   "MSE, %",
   "Fit",
@@ -145,13 +144,12 @@ async function drawing(receipt) {
       .join("");
   const label = `Torque over speed: ${all.length} measured points and ${curves.length} fitted curves; the numbers are in the table below`;
   return svg(
-    "svg",
-    { class: "curve", viewBox: "0 0 700 290", role: "img", "aria-label": label },
+    "svg.curve",
+    { viewBox: "0 0 700 290", role: "img", "aria-label": label },
     [0, 0.25, 0.5, 0.75, 1].map((share) =>
       svg(
         "g",
-        {},
-        svg("line", { class: "grid", x1: 46, x2: 686, y1: y(share * high), y2: y(share * high) }),
+        svg("line.grid", { x1: 46, x2: 686, y1: y(share * high), y2: y(share * high) }),
         svg("text", { x: 40, y: Number(y(share * high)) + 4, "text-anchor": "end" }, significant(share * high, 2)),
         svg("text", { x: x(share * wide), y: 267, "text-anchor": "middle" }, fixed(share * wide)),
       ),
@@ -161,7 +159,6 @@ async function drawing(receipt) {
     curves.map(({ measured, fitted }) =>
       svg(
         "g",
-        {},
         measured.map(({ speed, torque }) => svg("circle", { cx: x(speed), cy: y(torque), r: 2 })),
         svg("path", { d: pathOf(fitted) }),
       ),

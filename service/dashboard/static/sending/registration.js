@@ -9,60 +9,41 @@ import { problemView } from "../shared/problem_view.js";
 
 /** @typedef {{ [Key in keyof ClutchIn]?: Partial<ClutchIn[Key]> }} ClutchRecord a clutch as the API takes it */
 
-/** The form's values at first: the reference's clutch, as the service fills in what is left out. */
-export const DEFAULTS = {
-  geometry: {
-    inner_diameter_mm: 99,
-    outer_diameter_mm: 133,
-    friction_faces: 2,
-    mean_radius_mm: null,
-    pressure_factor: 1,
-  },
-  oil: { kinematic_viscosity_40c_cst: 56, kinematic_viscosity_100c_cst: 9.3 },
-  end_of_life: { cof_fraction: 0.5 },
-  friction_material: "paper",
-  reaction_plate: "steel",
-  fluid: "ATF",
-};
-
 export const IDENTIFIER = {
   pattern: "[A-Za-z0-9][A-Za-z0-9._:@+\\-]{0,127}",
   title: "letters, digits and . _ : @ + -",
 };
 
-/** @typedef {{ group: string | null, name: string, label: string, integer?: boolean, text?: boolean, optional?: string }} Field */
+/** @typedef {[path: string, label: string, value: string | number | null, attributes?: Record<string, string | number | boolean>]} Field `path`: in the record */
 
-/** @type {[string, Field[]][]} */
-const SECTIONS = [
+/** @type {[string, Field[]][]} the form's fields, with the reference clutch's values, which the service fills in where one is left out */
+export const SECTIONS = [
   [
     "Geometry",
     [
-      { group: "geometry", name: "inner_diameter_mm", label: "Inner diameter, mm" },
-      { group: "geometry", name: "outer_diameter_mm", label: "Outer diameter, mm" },
-      { group: "geometry", name: "friction_faces", label: "Friction faces", integer: true },
-      { group: "geometry", name: "mean_radius_mm", label: "Mean radius, mm", optional: "from the diameters" },
-      { group: "geometry", name: "pressure_factor", label: "Lining pressure divided by line pressure" },
+      ["geometry.inner_diameter_mm", "Inner diameter, mm", 99],
+      ["geometry.outer_diameter_mm", "Outer diameter, mm", 133],
+      ["geometry.friction_faces", "Friction faces", 2, { step: 1 }],
+      ["geometry.mean_radius_mm", "Mean radius, mm", null, { required: false, placeholder: "from the diameters" }],
+      ["geometry.pressure_factor", "Lining pressure divided by line pressure", 1],
     ],
   ],
   [
     "Oil",
     [
-      { group: "oil", name: "kinematic_viscosity_40c_cst", label: "Viscosity at 40 °C, cSt" },
-      { group: "oil", name: "kinematic_viscosity_100c_cst", label: "Viscosity at 100 °C, cSt" },
-      { group: null, name: "fluid", label: "Fluid", text: true },
+      ["oil.kinematic_viscosity_40c_cst", "Viscosity at 40 °C, cSt", 56],
+      ["oil.kinematic_viscosity_100c_cst", "Viscosity at 100 °C, cSt", 9.3],
+      ["fluid", "Fluid", "ATF"],
     ],
   ],
   [
     "Materials",
     [
-      { group: null, name: "friction_material", label: "Friction material", text: true },
-      { group: null, name: "reaction_plate", label: "Reaction plate", text: true },
+      ["friction_material", "Friction material", "paper"],
+      ["reaction_plate", "Reaction plate", "steel"],
     ],
   ],
-  [
-    "End of life",
-    [{ group: "end_of_life", name: "cof_fraction", label: "Mean COF as a share of its value when new, 0 to 1" }],
-  ],
+  ["End of life", [["end_of_life.cof_fraction", "Mean COF as a share of its value when new, 0 to 1", 0.5]]],
 ];
 
 /**
@@ -74,7 +55,7 @@ const SECTIONS = [
  * @returns {Promise<string | null>}
  */
 export function register(id, { similar = [], record = null, lead = "" } = {}) {
-  const dialog = h("dialog", { class: "registration", "aria-labelledby": "registration-title" });
+  const dialog = h("dialog.registration", { "aria-labelledby": "registration-title" });
   /** @type {string | null} */
   let result = null;
   /** @param {string} chosen */
@@ -85,24 +66,28 @@ export function register(id, { similar = [], record = null, lead = "" } = {}) {
   const others = similar.map((name) => button(`Send to ${name} instead`, () => end(name)));
   dialog.append(
     h("h2", { id: "registration-title" }, "Register a clutch"),
-    lead && h("p", { class: "notice" }, lead),
-    others.length > 0 ? h("p", { class: "buttons start" }, others) : "",
+    lead && h("p.notice", lead),
+    others.length > 0 ? h("p.row.buttons.start", others) : "",
     quiet("These are the values of the reference clutch. Change the values that differ on your clutch."),
     form(id, record, end, () => dialog.close()),
   );
   return answered(dialog, () => result);
 }
 
-/**
- * @param {string} id
- * @param {ClutchRecord | null} record
- * @param {(id: string) => void} registered
- * @param {() => void} cancel
- */
+/** @type {(id: string, record: ClutchRecord | null, registered: (id: string) => void, cancel: () => void) => HTMLElement} */
 function form(id, record, registered, cancel) {
   const attributes = { required: true, autocomplete: "off", autofocus: true, ...IDENTIFIER };
   const name = h("input", { id: "new-id", value: id, ...attributes });
-  const inputs = SECTIONS.flatMap(([, fields]) => fields.map((shown) => inputOf(shown, record)));
+  /** @type {[string, HTMLInputElement][]} by their place in the record */
+  const inputs = [];
+  const sections = SECTIONS.map(([title, fields]) => {
+    const labelled = fields.map((each) => {
+      const input = inputOf(each, record);
+      inputs.push([each[0], input]);
+      return field(input, each[1]);
+    });
+    return h("fieldset", h("legend", title), h("div.fields", labelled));
+  });
   const answer = h("div", { "aria-live": "polite" });
   const submit = async (/** @type {SubmitEvent} */ event) => {
     event.preventDefault();
@@ -114,51 +99,28 @@ function form(id, record, registered, cancel) {
       answer.replaceChildren(problemView(problem, "Not registered. "));
     }
   };
-  const sections = SECTIONS.map(([title, fields]) => {
-    const own = inputs.filter((input) => fields.includes(input.field));
-    const labelled = own.map(({ field: { label }, element }) => field(element, label));
-    return h("fieldset", {}, h("legend", {}, title), h("div", { class: "fields" }, labelled));
-  });
-  return h(
-    "form",
-    { onsubmit: submit },
-    h("div", { class: "fields" }, field(name, "Clutch id")),
-    sections,
-    answer,
-    h("div", { class: "buttons" }, button("Cancel", cancel), h("button", { class: "main" }, "Register this clutch")),
-  );
+  const buttons = h("div.row.buttons", button("Cancel", cancel), h("button.main", "Register this clutch"));
+  return h("form", { onsubmit: submit }, h("div.fields", field(name, "Clutch id")), sections, answer, buttons);
 }
 
-/** @typedef {{ field: Field, element: HTMLInputElement }} Input */
-
-/** @type {(field: Field, record: ClutchRecord | null) => Input} */
-function inputOf(field, record) {
-  const { group, name, integer, text, optional } = field;
-  const value = valueIn(record, field) ?? valueIn(DEFAULTS, field);
-  const kind = text ? { maxlength: 100 } : { type: "number", step: integer ? 1 : "any", min: 0, inputmode: "decimal" };
-  const attributes = { required: !optional, placeholder: optional, value: value ?? "", autocomplete: "off" };
-  return { field, element: h("input", { id: `new-${group ?? "clutch"}-${name}`, ...kind, ...attributes }) };
+/** @type {(field: Field, record: ClutchRecord | null) => HTMLInputElement} */
+function inputOf([path, , usual, attributes], record) {
+  const own = path.split(".").reduce((value, name) => value?.[name], /** @type {any} */ (record));
+  const kind =
+    typeof usual === "string" ? { maxlength: 100 } : { type: "number", step: "any", min: 0, inputmode: "decimal" };
+  const all = { required: true, value: own ?? usual ?? "", autocomplete: "off", ...kind, ...attributes };
+  return h("input", { id: `new-${path.replace(".", "-")}`, ...all });
 }
 
-/** @type {(record: ClutchRecord | null, field: Field) => string | number | null | undefined} */
-function valueIn(record, { group, name }) {
-  const values = /** @type {Record<string, any>} */ (record ?? {});
-  return group === null ? values[name] : values[group]?.[name];
-}
-
-/**
- * The record as the form has it, beside what the form does not show.
- * @param {string} id
- * @param {Input[]} inputs
- * @param {ClutchRecord | null} record
- */
-export function recordOf(id, inputs, record) {
+/** @type {(id: string, inputs: [string, HTMLInputElement][], record: ClutchRecord | null) => object} beside what the form does not show */
+function recordOf(id, inputs, record) {
   /** @type {Record<string, any>} */
-  const body = { ...(record ?? {}), clutch_id: id };
-  for (const { field, element } of inputs) {
-    const value = field.text ? element.value.trim() : element.value === "" ? null : Number(element.value);
-    if (field.group === null) body[field.name] = value;
-    else body[field.group] = { ...body[field.group], [field.name]: value };
+  const body = { ...record, clutch_id: id };
+  for (const [path, { type, value: typed }] of inputs) {
+    const [name, group] = path.split(".").reverse();
+    const value = type !== "number" ? typed.trim() : typed === "" ? null : Number(typed);
+    if (group === undefined) body[name] = value;
+    else body[group] = { ...body[group], [name]: value };
   }
   return body;
 }

@@ -42,7 +42,7 @@ export class RunFile {
     this.listed = listed;
     /** @type {Progress} */
     this.progress = "waiting";
-    this.outcome = h("div", { class: "outcome" });
+    this.outcome = h("div.outcome");
     const number = (count += 1);
     const byName = guess(file.name);
     const kind = listed?.kind ?? byName.kind;
@@ -58,18 +58,12 @@ export class RunFile {
       this.importer = new Importer(file, number, run);
     }
     this.clutch = "";
-    this.remark = h("p", { class: "remark", role: "status" });
-    this.fields = h("fieldset", { class: "fields" }, json ? null : this.fileFields());
+    this.remark = h("p.remark", { role: "status" });
+    this.fields = h("fieldset.fields", json ? null : this.fileFields());
     this.element = h(
-      "div",
-      { class: "file", role: "group", "aria-label": file.name },
-      h(
-        "p",
-        { class: "name" },
-        h("b", {}, file.name),
-        h("span", { class: "quiet" }, ` · ${size(file.size)}`),
-        this.run(),
-      ),
+      "div.file",
+      { role: "group", "aria-label": file.name },
+      h("p.name", h("b", file.name), h("span.quiet", ` · ${size(file.size)}`), this.run()),
       this.remark,
       this.fields,
       this.importer && [this.importer.lead, this.importer.element],
@@ -79,7 +73,7 @@ export class RunFile {
 
   /** What a JSON run says itself and any other file does not. */
   fileFields() {
-    const byName = h("small", {}, "as the file's name says");
+    const byName = h("small", "as the file's name says");
     return [
       field(this.kind, "Kind of test", this.guessed.kind && byName.cloneNode(true)),
       field(this.cycles, "Duty cycles since new", this.guessed.cycles && byName.cloneNode(true)),
@@ -132,7 +126,7 @@ export class RunFile {
   /** @type {(receipt: Receipt, open: boolean) => Promise<HTMLElement>} */
   async receipt(receipt, open) {
     if (open) return receiptView(receipt);
-    const details = h("details", {}, h("summary", {}, "Receipt"));
+    const details = h("details", h("summary", "Receipt"));
     const show = async () => details.append(await receiptView(receipt));
     details.addEventListener("toggle", show, { once: true });
     return details;

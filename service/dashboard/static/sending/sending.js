@@ -4,7 +4,7 @@
 // name says), importer.js (how it is read), registration.js (a clutch that is not known yet) and receipt.js (what the service made of a run).
 
 import { clutchPath, Problem, read } from "../shared/api.js";
-import { button, field, h } from "../shared/dom.js";
+import { answered, button, field, h } from "../shared/dom.js";
 import { problemView } from "../shared/problem_view.js";
 import { batchOf } from "./batch.js";
 import { IDENTIFIER, register } from "./registration.js";
@@ -16,144 +16,109 @@ import { registeredLike, similarRegistered } from "./similar_names.js";
 
 /** @type {(button: HTMLElement, page: Page) => void} make a button and the whole page take files */
 export function sender(button, page) {
-  takeFiles(button, async (files) => new Sending(await batchOf(files), page).open());
+  takeFiles(button, async (files) => open(await batchOf(files), page));
 }
 
-class Sending {
-  /**
-   * @param {Batch} batch
-   * @param {Page} page
-   */
-  constructor(batch, page) {
-    this.batch = batch;
-    this.page = page;
-    this.alone = batch.runs.length === 1;
-    const typed = { required: true, list: "registered", autocomplete: "off", spellcheck: "false", ...IDENTIFIER };
-    this.clutch = h("input", { id: "to", value: page.clutch ?? namedIn(batch), ...typed });
-    this.go = h("button", { class: "main" });
-    this.answer = h("div", { class: "answer", role: "status" });
-    this.dialog = h("dialog", { "aria-labelledby": "sending-title" });
-    this.closed = false;
-    this.dialog.addEventListener("close", () => {
-      this.closed = true; // a file that is on its way still arrives; the ones after it are not sent
-      this.dialog.remove();
-    });
-  }
+/** @type {(batch: Batch, page: Page) => void} the dialog that sends them */
+function open(batch, page) {
+  const { runs, wrong } = batch;
+  const alone = runs.length === 1;
+  const typed = { required: true, list: "registered", autocomplete: "off", spellcheck: "false", ...IDENTIFIER };
+  const clutch = h("input", { id: "to", value: page.clutch ?? namedIn(batch), ...typed });
+  const suggestions = h("datalist", { id: "registered" });
+  const answer = h("div.answer", { role: "status" });
+  const go = h("button.main");
+  const onsubmit = (/** @type {SubmitEvent} */ event) => {
+    event.preventDefault();
+    send();
+  };
+  const close = button("Close", () => dialog.close());
+  const elements = runs.map((run) => run.element);
+  const form = h(
+    "form",
+    { onsubmit },
+    h("div.fields", field(clutch, "Clutch", suggestions)),
+    wrong.length > 0 ? notRuns(wrong) : "",
+    h("div.listed", elements),
+    answer,
+    h("div.row.buttons", close, go),
+  );
+  const title = h("h2", { id: "sending-title" }, runs.length > 1 ? `Send ${runs.length} runs` : "Send a run");
+  const dialog = h("dialog", { "aria-labelledby": "sending-title" }, title, form);
 
   /** The runs that are not stored yet. */
-  left() {
-    return this.batch.runs.filter((run) => run.progress !== "stored");
+  const left = () => runs.filter((run) => run.progress !== "stored");
+
+  /** A file that is on its way when the dialog is closed still arrives; the ones after it are not sent. */
+  const closed = () => !dialog.open;
+
+  function typedName() {
+    const name = clutch.value.trim();
+    for (const run of runs) run.compare(name);
+    suggest(name);
   }
 
-  open() {
-    const { runs, wrong } = this.batch;
-    const suggestions = h("datalist", { id: "registered" });
-    const submit = (/** @type {SubmitEvent} */ event) => {
-      event.preventDefault();
-      this.send();
-    };
-    const close = button("Close", () => this.dialog.close());
-    const elements = runs.map((run) => run.element);
-    const compare = () => runs.forEach((run) => run.compare(this.clutch.value.trim()));
-    this.clutch.addEventListener("input", compare);
-    this.clutch.addEventListener("input", () => this.suggest(suggestions));
-    this.suggest(suggestions);
-    this.dialog.append(
-      h("h2", { id: "sending-title" }, runs.length > 1 ? `Send ${runs.length} runs` : "Send a run"),
-      h(
-        "form",
-        { onsubmit: submit },
-        h("div", { class: "fields" }, field(this.clutch, "Clutch", suggestions)),
-        wrong.length > 0 ? notRuns(wrong) : "",
-        h("div", { class: "files" }, elements),
-        this.answer,
-        h("div", { class: "buttons" }, close, this.go),
-      ),
-    );
-    this.showGo();
-    compare();
-    document.body.append(this.dialog);
-    this.dialog.showModal();
-    this.firstEmpty().focus();
-    this.look();
+  /** @type {(name: string) => Promise<void>} offer registered names that contain what is typed */
+  async function suggest(name) {
+    const names = await registeredLike(name).catch(() => []); // sending itself says what is wrong
+    if (name === clutch.value.trim()) suggestions.replaceChildren(...names.map((id) => h("option", { value: id })));
   }
 
   /**
    * See how the files are read, one after the other. Where saved profiles say all of them and the page says the clutch, they
    * are sent without a question.
    */
-  async look() {
-    const { runs, wrong } = this.batch;
+  async function look() {
     for (const { importer } of runs) await importer?.look();
     const decided = runs.length > 0 && wrong.length === 0 && runs.every(({ importer }) => importer?.decided);
-    const untouched = !this.closed && runs.every(({ progress }) => progress === "waiting");
-    if (decided && untouched && this.clutch.value === this.page.clutch)
-      this.dialog.querySelector("form")?.requestSubmit();
+    const untouched = !closed() && runs.every(({ progress }) => progress === "waiting");
+    if (decided && untouched && clutch.value === page.clutch) form.requestSubmit();
   }
 
-  /** @type {(place: HTMLElement) => Promise<void>} offer registered names that contain what is typed */
-  async suggest(place) {
-    const typed = this.clutch.value.trim();
-    const names = await registeredLike(typed).catch(() => []); // sending itself says what is wrong
-    if (typed === this.clutch.value.trim()) place.replaceChildren(...names.map((id) => h("option", { value: id })));
+  function showGo() {
+    const { length } = left();
+    const tried = runs.some((run) => run.progress !== "waiting");
+    const rest = tried ? ` the ${length} that ${length === 1 ? "is" : "are"} left` : ` ${length} runs`;
+    go.textContent = `Send${alone ? "" : rest}${tried && alone ? " again" : ""}`;
+    go.hidden = length === 0;
   }
 
-  /** The field that the reader has to fill in first, else the button that sends. */
-  firstEmpty() {
-    const fields = this.dialog.querySelectorAll("input[required], select[required]");
-    return (
-      /** @type {HTMLElement[]} */ ([...fields]).find((input) => "value" in input && input.value === "") ?? this.go
-    );
-  }
-
-  showGo() {
-    const { length } = this.left();
-    const tried = this.batch.runs.some((run) => run.progress !== "waiting");
-    const many = this.alone
-      ? ""
-      : tried
-        ? ` the ${length} that ${length === 1 ? "is" : "are"} left`
-        : ` ${length} runs`;
-    this.go.textContent = `Send${many}${tried && this.alone ? " again" : ""}`;
-    this.go.hidden = length === 0;
-  }
-
-  async send() {
-    this.go.disabled = true;
-    this.answer.replaceChildren();
+  async function send() {
+    go.disabled = true;
+    answer.replaceChildren();
     try {
-      const id = await this.registered(this.clutch.value.trim());
-      if (id === null) this.answer.replaceChildren(h("p", { class: "notice" }, "Nothing was sent."));
-      else await this.sendAll(id);
+      const id = await registered(clutch.value.trim());
+      if (id === null) answer.replaceChildren(h("p.notice", "Nothing was sent."));
+      else await sendAll(id);
     } catch (problem) {
-      this.answer.replaceChildren(problemView(problem));
+      answer.replaceChildren(problemView(problem));
     } finally {
-      this.go.disabled = false;
-      this.showGo();
+      go.disabled = false;
+      showGo();
     }
   }
 
   /** @param {string} id */
-  async sendAll(id) {
-    const runs = this.left();
+  async function sendAll(id) {
+    const all = left();
     let held = 0;
-    for (const run of runs) {
-      if (this.closed) return;
+    for (const run of all) {
+      if (closed()) return;
       run.element.scrollIntoView({ block: "nearest" });
-      const receipt = await run.send(id, this.alone);
-      if (receipt !== null) this.page.sent();
+      const receipt = await run.send(id, alone);
+      if (receipt !== null) page.sent();
       if (receipt?.state === "held") held += 1;
     }
-    const failed = this.left();
-    if (!this.alone) this.answer.replaceChildren(summary(runs.length - failed.length, failed.length, held, id));
-    (failed[0] ?? this.batch.runs[0])?.element.scrollIntoView({ block: "nearest" });
+    const failed = left();
+    if (!alone) answer.replaceChildren(summary(all.length - failed.length, failed.length, held, id));
+    (failed[0] ?? runs[0])?.element.scrollIntoView({ block: "nearest" });
   }
 
   /**
    * The registered clutch to send to: the one that was named, or the one that the reader registers or chooses now.
    * @type {(id: string) => Promise<string | null>}
    */
-  async registered(id) {
+  async function registered(id) {
     try {
       await read(clutchPath(id));
       return id;
@@ -161,10 +126,19 @@ class Sending {
       if (!(problem instanceof Problem && problem.status === 404)) throw problem;
     }
     const lead = `No clutch is registered as “${id}”. Nothing has been sent yet.`;
-    const chosen = await register(id, { lead, similar: await similarRegistered(id), record: this.batch.record });
-    if (chosen !== null) this.clutch.value = chosen;
+    const chosen = await register(id, { lead, similar: await similarRegistered(id), record: batch.record });
+    if (chosen !== null) clutch.value = chosen;
     return chosen;
   }
+
+  clutch.addEventListener("input", typedName);
+  typedName();
+  showGo();
+  void answered(dialog, () => null);
+  // the field that the reader has to fill in first, else the button that sends
+  const fields = /** @type {HTMLInputElement[]} */ ([...form.querySelectorAll("input[required], select[required]")]);
+  (fields.find((input) => input.value === "") ?? go).focus();
+  look();
 }
 
 /** @type {(batch: Batch) => string | undefined} the clutch that the files name themselves, if they agree */
@@ -175,8 +149,8 @@ function namedIn({ runs, record }) {
 
 /** @param {string[]} wrong */
 function notRuns(wrong) {
-  const items = wrong.map((text) => h("li", {}, text));
-  return h("div", { class: "notice bad" }, h("b", {}, "Not sent, because they are not runs:"), h("ul", {}, items));
+  const items = wrong.map((text) => h("li", text));
+  return h("div.notice.bad", h("b", "Not sent, because they are not runs:"), h("ul", items));
 }
 
 /** @type {(stored: number, failed: number, held: number, id: string) => HTMLElement} `held`: of those stored */

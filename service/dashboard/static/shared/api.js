@@ -100,18 +100,19 @@ export async function read(path) {
 }
 
 /**
- * All items of a list, page by page.
+ * All items of a list, page by page, or those of its first `pages`; `more`: whether there are others.
  * @template Item
  * @param {string} path
- * @returns {Promise<{ items: Item[], changed: boolean }>}
+ * @returns {Promise<{ items: Item[], changed: boolean, more: boolean }>}
  */
-export async function readAll(path) {
+export async function readAll(path, pages = Infinity) {
   /** @type {Item[]} */
   const items = [];
   let changed = false;
   /** @type {string | null} */
   let cursor = null;
   do {
+    pages -= 1;
     const address =
       cursor === null ? path : `${path}${path.includes("?") ? "&" : "?"}cursor=${encodeURIComponent(cursor)}`;
     /** @type {{ body: ListPage<Item>, changed: boolean }} */
@@ -119,8 +120,8 @@ export async function readAll(path) {
     items.push(...page.body.items);
     changed ||= page.changed;
     cursor = page.body.next ?? null;
-  } while (cursor !== null);
-  return { items, changed };
+  } while (cursor !== null && pages > 0);
+  return { items, changed, more: cursor !== null };
 }
 
 /**

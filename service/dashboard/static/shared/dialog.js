@@ -1,8 +1,8 @@
 // @ts-check
 // Questions in a dialog: each has a form that is sent, or is left.
 
-import { answered, button, h, quiet } from "./dom.js";
-import { problemView } from "./problem_view.js";
+import { answered, button, h } from "./dom.js";
+import { attempted } from "./problem_view.js";
 
 /** @import { Content } from "./dom.js" */
 
@@ -24,28 +24,23 @@ import { problemView } from "./problem_view.js";
  * @returns {Promise<Result | null>}
  */
 export function asked({ title, lines = [], fields = [], action, leave = "Cancel", send }) {
-  const answer = h("div", { class: "answer", "aria-live": "polite" });
-  const go = h("button", { class: "main" }, action);
-  const dialog = h("dialog", { class: "narrow", "aria-labelledby": "question-title" });
+  const answer = h("div.answer", { "aria-live": "polite" });
+  const go = h("button.main", action);
+  const dialog = h("dialog.narrow", { "aria-labelledby": "question-title" });
   /** @type {Result | null} */
   let result = null;
   const submit = async (/** @type {SubmitEvent} */ event) => {
     event.preventDefault();
-    go.disabled = true;
-    answer.replaceChildren(quiet("Computing …"));
-    try {
+    const work = async () => {
       result = await send();
       dialog.close();
-    } catch (problem) {
-      answer.replaceChildren(problemView(problem, "Nothing was changed. "));
-    } finally {
-      go.disabled = false;
-    }
+    };
+    await attempted(go, answer, "Computing …", work, "Nothing was changed. ");
   };
   const cancel = button(leave, () => dialog.close());
-  const form = h("div", { class: "fields" }, fields);
-  const buttons = h("div", { class: "buttons" }, cancel, go);
-  dialog.append(h("h2", { id: "question-title" }, title), h("div", {}, ...lines));
+  const form = h("div.fields", fields);
+  const buttons = h("div.row.buttons", cancel, go);
+  dialog.append(h("h2", { id: "question-title" }, title), h("div", ...lines));
   dialog.append(h("form", { onsubmit: submit }, form, answer, buttons));
   return answered(dialog, () => result);
 }
@@ -55,7 +50,7 @@ export function asked({ title, lines = [], fields = [], action, leave = "Cancel"
  * @param {{ title: string, points: string[], action: string, more?: Content }} question
  */
 export async function agreed({ title, points, action, more = null }) {
-  const items = points.map((point) => h("li", {}, point));
-  const lines = [h("ul", {}, items), more];
+  const items = points.map((point) => h("li", point));
+  const lines = [h("ul", items), more];
   return (await asked({ title, lines, action, leave: "Leave it as it is", send: () => true })) === true;
 }

@@ -13,37 +13,42 @@ import { at } from "./address.js";
 const SVG = "http://www.w3.org/2000/svg";
 
 /**
- * An element with attributes and children (nodes or text).
+ * An element by its name and classes ("p", "p.notice.bad"); then attributes, where it has any, and its children.
  * @template {keyof HTMLElementTagNameMap} Name
- * @param {Name} name
- * @param {Attributes} [attributes]
- * @param {Content[]} children
+ * @param {Name | `${Name}.${string}`} name
+ * @param {(Attributes | Content)[]} rest
  * @returns {HTMLElementTagNameMap[Name]}
  */
-export function h(name, attributes = {}, ...children) {
-  return filled(document.createElement(name), attributes, children);
+export function h(name, ...rest) {
+  const [tag, ...classes] = name.split(".");
+  return filled(document.createElement(/** @type {Name} */ (tag)), classes, rest);
 }
 
 /**
  * The same for SVG.
  * @template {keyof SVGElementTagNameMap} Name
- * @param {Name} name
- * @param {Attributes} [attributes]
- * @param {Content[]} children
+ * @param {Name | `${Name}.${string}`} name
+ * @param {(Attributes | Content)[]} rest
  * @returns {SVGElementTagNameMap[Name]}
  */
-export function svg(name, attributes = {}, ...children) {
-  return filled(document.createElementNS(SVG, name), attributes, children);
+export function svg(name, ...rest) {
+  const [tag, ...classes] = name.split(".");
+  return filled(document.createElementNS(SVG, /** @type {Name} */ (tag)), classes, rest);
 }
+
+/** @type {(value: Attributes | Content) => value is Attributes} */
+const isAttributes = (value) => value?.constructor === Object;
 
 /**
  * @template {HTMLElement | SVGElement} Filled
  * @param {Filled} element
- * @param {Attributes} attributes
- * @param {Content[]} children
+ * @param {string[]} classes
+ * @param {(Attributes | Content)[]} rest
  */
-function filled(element, attributes, children) {
-  for (const [key, value] of Object.entries(attributes)) {
+function filled(element, classes, [first, ...children]) {
+  if (classes.length > 0) element.setAttribute("class", classes.join(" "));
+  if (!isAttributes(first)) children.unshift(first);
+  for (const [key, value] of isAttributes(first) ? Object.entries(first) : []) {
     if (value === null || value === undefined || value === false) continue;
     if (typeof value === "function") element.addEventListener(key.slice(2), value);
     else if (typeof value === "object") {
@@ -92,7 +97,7 @@ export function select(attributes, options, chosen) {
 }
 
 /** @type {(...content: Content[]) => HTMLElement} a paragraph beside the matter */
-export const quiet = (...content) => h("p", { class: "quiet" }, ...content);
+export const quiet = (...content) => h("p.quiet", ...content);
 
 /**
  * A field below its label.
@@ -100,10 +105,10 @@ export const quiet = (...content) => h("p", { class: "quiet" }, ...content);
  * @param {Content} label
  * @param {Content} [more] what stands below it
  */
-export const field = (input, label, more = null) => h("div", {}, h("label", { for: input.id }, label), input, more);
+export const field = (input, label, more = null) => h("div", h("label", { for: input.id }, label), input, more);
 
 /** @type {(letter: string, index: string) => HTMLElement} a letter with its index */
-export const symbol = (letter, index) => h("span", {}, letter, h("sub", {}, index));
+export const symbol = (letter, index) => h("span", letter, h("sub", index));
 
 /**
  * A table with a caption and a header; `columns` are names, rows are cells of text or nodes.
@@ -116,17 +121,14 @@ export function table(caption, columns, rows, { shown = false } = {}) {
   const header = columns.map((name) => h("th", { scope: "col" }, name));
   return h(
     "table",
-    {},
     h("caption", { class: shown ? null : "hidden" }, caption),
-    h("thead", {}, h("tr", {}, header)),
+    h("thead", h("tr", header)),
     h(
       "tbody",
-      {},
       rows.map((row) =>
         h(
           "tr",
-          {},
-          row.map((cell) => h("td", {}, cell ?? "–")),
+          row.map((cell) => h("td", cell ?? "–")),
         ),
       ),
     ),
@@ -135,14 +137,14 @@ export function table(caption, columns, rows, { shown = false } = {}) {
 
 /** @type {(label: string, ...content: Content[]) => HTMLElement} a place that scrolls, by keyboard too */
 export const scrolling = (label, ...content) =>
-  h("div", { class: "scroll", tabindex: "0", role: "group", "aria-label": label }, ...content);
+  h("div.scroll", { tabindex: "0", role: "group", "aria-label": label }, ...content);
 
 /**
  * Rare actions behind a button: opened and closed by it, left by Escape.
  * @type {(label: string, entries: { label: string, onclick: () => unknown, checked?: boolean }[]) => HTMLElement}
  */
 export function menu(label, entries) {
-  const details = h("details", { class: "menu" }, h("summary", {}, label));
+  const details = h("details.menu", h("summary", label));
   const close = () => {
     details.open = false;
   };
@@ -154,7 +156,7 @@ export function menu(label, entries) {
     const pressed = checked === undefined ? null : String(checked);
     return h("button", { type: "button", onclick: choose, "aria-pressed": pressed }, text);
   });
-  details.append(h("div", { class: "entries" }, items));
+  details.append(h("div.entries", items));
   details.addEventListener("keydown", (event) => {
     if (event.key !== "Escape" || !details.open) return;
     close();
@@ -201,8 +203,8 @@ export function saveBlob(name, content) {
 
 /** @type {(text: string) => HTMLElement} a command beside a button that copies it and says so */
 export function copyable(text) {
-  const status = h("span", { class: "copied", role: "status" });
-  const code = h("code", {}, text);
+  const status = h("span.copied", { role: "status" });
+  const code = h("code", text);
   const copy = async () => {
     try {
       await navigator.clipboard.writeText(text);
@@ -217,5 +219,5 @@ export function copyable(text) {
   };
   const label = `Copy: ${text.split("\n")[0].slice(0, 60)}`;
   const button = h("button", { type: "button", onclick: copy, "aria-label": label }, "Copy");
-  return h("div", { class: "command" }, h("pre", { tabindex: "0" }, code), button, status);
+  return h("div.row.command", h("pre", { tabindex: "0" }, code), button, status);
 }

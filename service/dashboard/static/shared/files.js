@@ -17,20 +17,13 @@ export function files(name, address) {
     saveBlob(`${name}.csv`, new Blob([await readText(address)], { type: "text/csv" }));
   };
   const xlsx = async () => saveTable(`${name}.xlsx`, parsed(await readText(address)));
-  return h(
-    "span",
-    { class: "files" },
-    h("a", { href: address, onclick: csv }, "CSV"),
-    " ",
-    button("XLSX", xlsx, { class: "link" }),
-  );
+  return h("span.saved", h("a", { href: address, onclick: csv }, "CSV"), " ", button("XLSX", xlsx, { class: "link" }));
 }
 
 /** @type {(name: string, rows: Cell[][]) => HTMLElement} the first row is the header; `name`: of the file */
 export const rowFiles = (name, rows) =>
   h(
-    "span",
-    { class: "files" },
+    "span.saved",
     ["csv", "xlsx"].map((format) =>
       button(format.toUpperCase(), () => saveTable(`${name}.${format}`, rows), { class: "link" }),
     ),

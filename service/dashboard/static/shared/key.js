@@ -14,12 +14,12 @@ export function askForKey(detail) {
     "form",
     { method: "dialog" },
     h("h2", { id: "key-title" }, "This service asks for a key"),
-    h("p", {}, detail || ABOUT),
-    h("pre", {}, h("code", {}, "clutchlife key create --scope read")),
+    h("p", detail || ABOUT),
+    h("pre", h("code", "clutchlife key create --scope read")),
     h("label", { for: "key" }, "Key"),
     input,
     quiet("It is kept in this tab until you close it, and sent to this service only."),
-    h("div", { class: "buttons" }, h("button", { class: "main" }, "Use this key")),
+    h("div.row.buttons", h("button.main", "Use this key")),
   );
   const dialog = h("dialog", { "aria-labelledby": "key-title" }, form);
   dialog.addEventListener("cancel", (event) => event.preventDefault());

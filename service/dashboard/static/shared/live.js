@@ -28,8 +28,8 @@ export class Live {
   problem = null;
   /** @type {number | null} when the next poll is due, ms since 1970 */
   nextAt = null;
-  text = h("span", { class: "asof" });
-  change = h("span", { class: "hidden", role: "status" });
+  text = h("span.asof");
+  change = h("span.hidden", { role: "status" });
   retry = button("Try now", () => this.now(), { hidden: true });
 
   /**
@@ -40,7 +40,7 @@ export class Live {
     this.poll = poll;
     this.interval = interval;
     this.bar = byId("live");
-    this.bar.append(h("span", { class: "dot", "aria-hidden": "true" }), this.text, this.retry, this.change);
+    this.bar.append(h("span.dot", { "aria-hidden": "true" }), this.text, this.retry, this.change);
     document.addEventListener("visibilitychange", () => (document.hidden ? this.pause() : this.now()));
     addEventListener("online", () => this.now());
     setInterval(() => this.problem && this.draw(), 1000);

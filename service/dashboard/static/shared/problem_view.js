@@ -22,9 +22,24 @@ export function problemView(problem, lead) {
   const title = problem.title ? `${problem.title}: ` : "";
   return h(
     "div",
-    {},
-    h("p", { class: "notice bad", role: "alert" }, h("b", {}, start), title, problem.detail),
+    h("p.notice.bad", { role: "alert" }, h("b", start), title, problem.detail),
     rows.length > 0 && scrolling("What is wrong", table("What is wrong, by place", columns, rows)),
     problem.total > rows.length && quiet(`${rows.length} of ${problem.total} errors are shown.`),
   );
+}
+
+/**
+ * Do what a form asks for: its button rests meanwhile, and `answer` says what is under way, then what went wrong.
+ * @type {(go: HTMLButtonElement, answer: HTMLElement, status: string, work: () => Promise<unknown>, lead?: string) => Promise<void>}
+ */
+export async function attempted(go, answer, status, work, lead) {
+  go.disabled = true;
+  answer.replaceChildren(quiet(status));
+  try {
+    await work();
+  } catch (problem) {
+    answer.replaceChildren(problemView(problem, lead));
+  } finally {
+    go.disabled = false;
+  }
 }

@@ -25,9 +25,9 @@ export function sparkline(values, threshold = null) {
   const points = numbers.map((value, index) => `${x(index)},${y(value)}`).join(" ");
   const level = threshold === null ? null : y(threshold);
   return svg(
-    "svg",
-    { class: "spark", viewBox: `0 0 ${WIDTH} ${HEIGHT}`, width: WIDTH, height: HEIGHT, "aria-hidden": "true" },
-    level === null ? null : svg("line", { class: "threshold", x1: 0, x2: WIDTH, y1: level, y2: level }),
+    "svg.spark",
+    { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, width: WIDTH, height: HEIGHT, "aria-hidden": "true" },
+    level === null ? null : svg("line.threshold", { x1: 0, x2: WIDTH, y1: level, y2: level }),
     svg("polyline", { points }),
     svg("circle", { cx: x(last), cy: y(numbers[last]), r: 2.6 }),
   );
@@ -50,15 +50,15 @@ export function intervalBar(quantiles, scale) {
   const [median, high] = [quantiles["0.5"], quantiles["0.95"]];
   const beyond = high === null || high > scale;
   return svg(
-    "svg",
-    { class: "interval", viewBox: `0 0 ${WIDTH} 14`, width: WIDTH, height: 14, "aria-hidden": "true" },
-    svg("line", { class: "axis", x1: 0, x2: WIDTH, y1: 7, y2: 7 }),
+    "svg.interval",
+    { viewBox: `0 0 ${WIDTH} 14`, width: WIDTH, height: 14, "aria-hidden": "true" },
+    svg("line.axis", { x1: 0, x2: WIDTH, y1: 7, y2: 7 }),
     bar(at("0.05"), at("0.95"), { class: "wide", y: 5, height: 4 }),
     bar(at("0.25"), at("0.75"), { class: "half", y: 3, height: 8 }),
     median === null
       ? null
-      : svg("rect", { class: "median", x: Math.min(WIDTH - 2, at("0.5")).toFixed(1), width: 2, y: 1, height: 12 }),
-    beyond ? svg("path", { class: "beyond", d: `M${WIDTH - 6} 3l5 4-5 4` }) : null,
+      : svg("rect.median", { x: Math.min(WIDTH - 2, at("0.5")).toFixed(1), width: 2, y: 1, height: 12 }),
+    beyond ? svg("path.beyond", { d: `M${WIDTH - 6} 3l5 4-5 4` }) : null,
   );
 }
 
@@ -69,7 +69,7 @@ export function healthBar(health, state) {
   return svg(
     "svg",
     { class: `health state-${state}`, ...box, "aria-hidden": "true" },
-    svg("rect", { class: "axis", width: 60, height: 8, rx: 4 }),
-    svg("rect", { class: "fill", width, height: 8, rx: 4 }),
+    svg("rect.axis", { width: 60, height: 8, rx: 4 }),
+    svg("rect.fill", { width, height: 8, rx: 4 }),
   );
 }
