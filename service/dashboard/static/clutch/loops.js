@@ -7,7 +7,7 @@ import { loopCurves, loopPressures } from "../charts/loops.js";
 import { spread } from "../charts/stribeck.js";
 import { levelOptions, levelsOf, stateOptions, usual } from "../quantities/choices.js";
 import { LAG_NAMES, lagOverCycles, lagOverPressure } from "../quantities/lag.js";
-import { Lazy } from "../quantities/lazy.js";
+import { lazy } from "../quantities/lazy.js";
 import { QUANTITIES } from "../quantities/names.js";
 import { read } from "../shared/api.js";
 import { byId, within } from "../shared/dom.js";
@@ -41,8 +41,8 @@ export function loopsTab({ reader }) {
     } else if (what === "frequency" || what === "lagPressure") drawLag();
     else draw();
   });
-  const lags = new Lazy(byId("lag"), [overCycles, overPressure], readLag);
-  const wantLag = () => lags.want(`${reader.present().revision} ${chosen.lag}`);
+  const lookAtLag = lazy(byId("lag"), [overCycles, overPressure], readLag);
+  const wantLag = () => lookAtLag(`${reader.present().revision} ${chosen.lag}`);
 
   async function draw() {
     const ids = [...new Set(answers.loops.map((loop) => loop.run_id))];

@@ -7,7 +7,7 @@ import { fan } from "../charts/fan.js";
 import { meanCof } from "../charts/life.js";
 import { levelOptions, levelsOf, usual } from "../quantities/choices.js";
 import { criteriaTable } from "../quantities/criteria.js";
-import { Lazy } from "../quantities/lazy.js";
+import { lazy } from "../quantities/lazy.js";
 import { remainingBy } from "../quantities/remaining.js";
 import { shudderMargin } from "../quantities/shudder.js";
 import { read } from "../shared/api.js";
@@ -44,8 +44,8 @@ export function overviewTab(place, page) {
   const chosen = {};
   /** @type {Receipt[]} */
   let events = [];
-  const slopes = new Lazy(shudder.element, [shudder], readSlopes);
-  const wantSlopes = async () => slopes.want(`${(await reader.life()).revision} ${chosen.level}`);
+  const lookAtSlopes = lazy(shudder.element, [shudder], readSlopes);
+  const wantSlopes = async () => lookAtSlopes(`${(await reader.life()).revision} ${chosen.level}`);
   const choose = chooser(chosen, () => {
     tracked.limits = null;
     drawShudder();

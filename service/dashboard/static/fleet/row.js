@@ -10,15 +10,16 @@ import { heldText, stateIcon, STATES, VERDICTS } from "../shared/state.js";
 /** @import { StateName } from "../shared/state.js" */
 /** @import { ClutchOut, ClutchSummary } from "../shared/types.js" */
 
+/** @type {[Content, string][]} a column's title and width */
 export const COLUMNS = [
-  h("span.hidden", "Choose"),
-  "State",
-  "Clutch",
-  "Health",
-  "Remaining cycles",
-  "Mean COF over cycles",
-  "Last run",
-  "Diagnosis",
+  [h("span.hidden", "Choose"), "44px"],
+  ["State", "18%"],
+  ["Clutch", "15%"],
+  ["Health", "8%"],
+  ["Remaining cycles", "13.5%"],
+  ["Mean COF over cycles", "15.5%"],
+  ["Last run", "13%"],
+  ["Diagnosis", ""],
 ];
 
 /**

@@ -34,7 +34,8 @@ export class Rows {
     this.above = space();
     this.body = h("tbody", { role: "rowgroup" });
     this.below = space();
-    const columns = COLUMNS.map((name) => h("th", { role: "columnheader", scope: "col" }, name));
+    const heading = { role: "columnheader", scope: "col" };
+    const columns = COLUMNS.map(([name, width]) => h("th", { ...heading, style: { width } }, name));
     this.element = h(
       "table.fleet",
       { role: "table" },

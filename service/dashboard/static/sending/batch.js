@@ -2,9 +2,9 @@
 // Dropped files -> the runs among them: JSON runs, records, and what a campaign's folder says of both (`runs.json`,
 // `clutch.json`, as `clutchlife simulate` writes them).
 
-import { MOST_JSON_BYTES, RunFile } from "./run_file.js";
+import { MOST_JSON_BYTES, runFile } from "./run_file.js";
 
-/** @import { JsonRun, Listed } from "./run_file.js" */
+/** @import { JsonRun, Listed, RunFile } from "./run_file.js" */
 /** @import { ClutchRecord } from "./registration.js" */
 
 const LIST = "runs.json";
@@ -21,11 +21,11 @@ export async function batchOf(files) {
   for (const file of files) {
     if (file.name === LIST && listed !== null) continue;
     if (file.name === RECORD && batch.record !== null) continue;
-    if (!/\.json$/i.test(file.name)) batch.runs.push(new RunFile(file, null, listed?.get(file.name)));
+    if (!/\.json$/i.test(file.name)) batch.runs.push(runFile(file, null, listed?.get(file.name)));
     else {
       const run = await jsonRun(file);
       if (typeof run === "string") batch.wrong.push(`${file.name}: ${run}`);
-      else batch.runs.push(new RunFile(file, run, undefined));
+      else batch.runs.push(runFile(file, run));
     }
   }
   batch.runs.sort((a, b) => a.order() - b.order());

@@ -16,119 +16,111 @@ const ROWS = 5;
 /** Who chooses by typing a list's words is not interrupted by the answer to their first letter. */
 const PAUSE_MS = 400;
 
-export class Importer {
-  /**
-   * @param {File} file
-   * @param {number} number tells its fields from those of other files
-   * @param {{ kind: HTMLSelectElement, cycles: HTMLInputElement, clutch: () => string }} run
-   */
-  constructor(file, number, run) {
-    this.file = file;
-    this.number = number;
-    this.run = run;
-    /** @type {Preview | null} */
-    this.shown = null;
-    /** @type {RigProfile | null} the choices, where they are not those of a saved profile */
-    this.chosen = null;
-    this.questions = 0;
-    this.soon = 0;
-    // what was typed stays when the rest is drawn again
-    this.name = h("input", { id: `rig-${number}`, autocomplete: "off", spellcheck: "false" });
-    this.pattern = h("input", { id: `pattern-${number}`, autocomplete: "off" });
-    this.lead = h("p.quiet", { role: "status" }, "Reading …");
-    this.content = h("div");
-    this.element = h("details.import", h("summary", "Columns, units, and what is fitted"), this.content);
-    for (const input of [run.kind, run.cycles]) input.addEventListener("change", () => this.look());
-  }
+/**
+ * @param {File} file
+ * @param {number} number tells its fields from those of other files
+ * @param {{ kind: HTMLSelectElement, cycles: HTMLInputElement, clutch: () => string }} run
+ */
+export function importer(file, number, run) {
+  /** @type {Preview | null} */
+  let preview = null;
+  /** @type {RigProfile | null} the choices, where they are not those of a saved profile */
+  let chosen = null;
+  let questions = 0;
+  /** @type {ReturnType<typeof setTimeout> | undefined} */
+  let soon;
+  // what was typed stays when the rest is drawn again
+  const rigName = h("input", { id: `rig-${number}`, autocomplete: "off", spellcheck: "false" });
+  const pattern = h("input", { id: `pattern-${number}`, autocomplete: "off" });
+  const lead = h("p.quiet", { role: "status" }, "Reading …");
+  const content = h("div");
+  const element = h("details.import", h("summary", "Columns, units, and what is fitted"), content);
+  for (const input of [run.kind, run.cycles]) input.addEventListener("change", () => look());
 
   /** Whether a saved profile says all of it: then nothing is asked. */
-  get decided() {
-    const { shown } = this;
-    return shown !== null && shown.rig !== null && shown.missing.length === 0 && shown.problem === null;
-  }
+  const decided = () =>
+    preview !== null && preview.rig !== null && preview.missing.length === 0 && preview.problem === null;
 
   /** The saved profile that the file is sent with. */
-  get rig() {
-    return this.chosen === null ? (this.shown?.rig ?? null) : null;
-  }
+  const rig = () => (chosen === null ? (preview?.rig ?? null) : null);
 
   /** Ask how the file is read; an answer that came after a newer question is dropped. */
-  async look() {
-    const question = (this.questions += 1);
-    const first = this.shown === null; // what only the file's name suggests is no profile's word
-    const { kind, cycles, clutch } = this.run;
-    const query = new URLSearchParams({ filename: this.file.name.slice(-200) });
+  async function look() {
+    const question = (questions += 1);
+    const first = preview === null; // what only the file's name suggests is no profile's word
+    const { kind, cycles, clutch } = run;
+    const query = new URLSearchParams({ filename: file.name.slice(-200) });
     const own = first ? {} : { kind: kind.value, cycles: cycles.value };
-    const more = { ...own, clutch_id: clutch(), rig: this.rig };
+    const more = { ...own, clutch_id: clutch(), rig: rig() };
     for (const [name, value] of Object.entries(more)) if (value) query.set(name, value);
     try {
-      const { body } = await send("POST", `/v1/import/preview?${query}`, this.body());
-      if (question !== this.questions) return;
-      this.show(body);
-      if (first && body.rig === null && (kind.value || cycles.value)) await this.look();
+      const { body } = await send("POST", `/v1/import/preview?${query}`, sent());
+      if (question !== questions) return;
+      show(body);
+      if (first && body.rig === null && (kind.value || cycles.value)) await look();
     } catch (problem) {
-      if (question !== this.questions) return;
-      this.lead.replaceChildren();
-      this.content.replaceChildren(problemView(problem));
+      if (question !== questions) return;
+      lead.replaceChildren();
+      content.replaceChildren(problemView(problem));
     }
   }
 
   /** The file, in a form with the choices where there are any. */
-  body() {
-    if (this.chosen === null) return this.file;
+  function sent() {
+    if (chosen === null) return file;
     const form = new FormData();
-    form.append("profile", JSON.stringify(this.chosen));
-    form.append("file", this.file);
+    form.append("profile", JSON.stringify(chosen));
+    form.append("file", file);
     return form;
   }
 
   /** @param {Preview} shown */
-  show(shown) {
-    this.shown = shown;
-    if (this.rig !== null) {
-      if (shown.kind !== null) this.run.kind.value = shown.kind;
-      if (shown.cycles !== null) this.run.cycles.value = String(shown.cycles);
+  function show(shown) {
+    preview = shown;
+    if (rig() !== null) {
+      if (shown.kind !== null) run.kind.value = shown.kind;
+      if (shown.cycles !== null) run.cycles.value = String(shown.cycles);
     }
     const focused = document.activeElement?.id;
     const left = shown.missing.map(quantity).join(", ");
     const state = shown.problem ?? (left ? `Still missing: ${left}.` : "Ready to send.");
-    this.lead.replaceChildren(this.rig === null ? "" : h("b", `Read by the rig profile ${this.rig}. `), state);
-    this.element.open ||= shown.problem !== null || this.channelsLack();
-    this.content.replaceChildren(this.columns(shown), this.options(shown), drawing(shown) ?? "");
+    lead.replaceChildren(rig() === null ? "" : h("b", `Read by the rig profile ${rig()}. `), state);
+    element.open ||= shown.problem !== null || channelsLack();
+    content.replaceChildren(columnsTable(shown), options(shown), drawing(shown) ?? "");
     const noted = warnings(shown.warnings);
-    if (noted) this.content.append(noted);
-    this.content.append(this.saving(shown));
+    if (noted) content.append(noted);
+    content.append(saving(shown));
     if (focused) document.getElementById(focused)?.focus(); // what was chosen in was drawn again
   }
 
-  channelsLack() {
-    return this.shown?.missing.some((name) => !["kind", "cycles"].includes(name)) ?? false;
+  function channelsLack() {
+    return preview?.missing.some((name) => !["kind", "cycles"].includes(name)) ?? false;
   }
 
   /** @param {Preview} shown */
-  columns({ columns, first_rows: rows, units }) {
+  function columnsTable({ columns, first_rows: rows, units }) {
     /** @type {(name: string, cell: (column: PreviewColumn, index: number) => Content) => HTMLElement} */
     const line = (name, cell) => {
       const cells = columns.map((column, index) => h("td", cell(column, index)));
       return h("tr", h("th", { scope: "row" }, name), cells);
     };
     const choices = [
-      line("Channel", (column, index) => this.channel(column, index, Object.keys(units))),
-      line("Unit", (column, index) => this.unit(column, index, units[column.channel ?? ""] ?? [])),
-      line("Scale", (column, index) => this.factor(column, index, "scale")),
-      line("Offset", (column, index) => this.factor(column, index, "offset")),
+      line("Channel", (column, index) => channel(column, index, Object.keys(units))),
+      line("Unit", (column, index) => unit(column, index, units[column.channel ?? ""] ?? [])),
+      line("Scale", (column, index) => factor(column, index, "scale")),
+      line("Offset", (column, index) => factor(column, index, "offset")),
     ];
     const first = rows.slice(0, ROWS).map((row, index) => line(`Row ${index + 1}`, (_, at) => row[at] ?? ""));
     const titles = columns.map(({ title }) => h("th", { scope: "col" }, title));
-    const caption = h("caption.hidden", `First rows of ${this.file.name}`);
+    const caption = h("caption.hidden", `First rows of ${file.name}`);
     const head = h("thead", h("tr", h("th", { scope: "row" }, "Column"), titles));
     return scrolling("First rows", h("table.columns", caption, head, h("tbody", choices, first)));
   }
 
   /** @type {(column: PreviewColumn, index: number, channels: string[]) => HTMLElement} */
-  channel(column, index, channels) {
+  function channel(column, index, channels) {
     const options = channels.map((name) => /** @type {[string, string]} */ ([name, quantity(name)]));
-    const attributes = this.cell(column, index, "channel", (value, columns) => {
+    const attributes = cell(column, index, "channel", (value, columns) => {
       for (const other of columns) if (other.channel === value) Object.assign(other, { channel: null, unit: null });
       return { channel: /** @type {RigColumn["channel"]} */ (value), unit: null, stated: null };
     });
@@ -137,23 +129,23 @@ export class Importer {
   }
 
   /** @type {(column: PreviewColumn, index: number, units: string[]) => HTMLSelectElement | string} */
-  unit(column, index, units) {
+  function unit(column, index, units) {
     const { channel, unit, stated_unit: stated } = column;
     if (channel === null) return stated ?? "";
     const names = unit !== null && !units.includes(unit) ? [unit, ...units] : units;
     const options = names.map((name) => /** @type {[string, string]} */ ([name, name]));
     if (unit === null) options.unshift(["", "choose …"]);
     return select(
-      this.cell(column, index, "unit", (value) => ({ unit: value, stated })),
+      cell(column, index, "unit", (value) => ({ unit: value, stated })),
       options,
       unit,
     );
   }
 
   /** @type {(column: PreviewColumn, index: number, name: "scale" | "offset") => HTMLInputElement | string} */
-  factor(column, index, name) {
+  function factor(column, index, name) {
     if (column.channel === null) return "";
-    const attributes = this.cell(column, index, name, (value) => ({ [name]: Number(value) }));
+    const attributes = cell(column, index, name, (value) => ({ [name]: Number(value) }));
     return h("input", { ...attributes, type: "number", step: "any", required: true, value: column[name] });
   }
 
@@ -164,19 +156,19 @@ export class Importer {
    * @param {string} name
    * @param {(value: string | null, columns: RigColumn[]) => Partial<RigColumn>} change
    */
-  cell({ title }, index, name, change) {
+  function cell({ title }, index, name, change) {
     const onchange = (/** @type {any} */ event) =>
-      this.edit(({ columns }) => Object.assign(columns[index], change(event.target.value || null, columns)));
-    return { id: `import-${this.number}-${name}-${index}`, "aria-label": `${words(name)} of ${title}`, onchange };
+      edit(({ columns }) => Object.assign(columns[index], change(event.target.value || null, columns)));
+    return { id: `import-${number}-${name}-${index}`, "aria-label": `${words(name)} of ${title}`, onchange };
   }
 
   /** @param {Preview} shown */
-  options({ profile, tables }) {
+  function options({ profile, tables }) {
     const attributes = (/** @type {"decimal" | "table" | "missing"} */ name) => ({
-      id: `${name}-${this.number}`,
+      id: `${name}-${number}`,
       onchange: (/** @type {any} */ event) => {
         const { value } = event.target; // a sheet's name may end in a space
-        this.edit((edited) => Object.assign(edited, { [name]: (name === "missing" ? value.trim() : value) || null }));
+        edit((edited) => Object.assign(edited, { [name]: (name === "missing" ? value.trim() : value) || null }));
       },
     });
     const marks = Object.entries({ "": "found", ",": "comma: 1.234,5", ".": "point: 1,234.5" });
@@ -191,46 +183,48 @@ export class Importer {
   }
 
   /** @param {(profile: RigProfile) => unknown} change */
-  edit(change) {
-    if (this.shown === null) return;
-    const profile = structuredClone(this.chosen ?? this.shown.profile);
+  function edit(change) {
+    if (preview === null) return;
+    const profile = structuredClone(chosen ?? preview.profile);
     change(profile);
-    this.chosen = profile;
-    this.questions += 1; // an answer to what was chosen before is of no use
-    clearTimeout(this.soon);
-    this.soon = setTimeout(() => this.look(), PAUSE_MS);
+    chosen = profile;
+    questions += 1; // an answer to what was chosen before is of no use
+    clearTimeout(soon);
+    soon = setTimeout(() => look(), PAUSE_MS);
   }
 
   /** @param {Preview} shown */
-  saving({ profile, missing, problem }) {
-    if (this.rig !== null) return quiet("The next file with these columns is read the same way.");
-    const { name, pattern } = this;
+  function saving({ profile, missing, problem }) {
+    if (rig() !== null) return quiet("The next file with these columns is read the same way.");
+
     pattern.value ||= profile.file_name ?? "";
     const answer = h("div", { role: "status" });
     const save = async () => {
-      const kept = { ...profile, name: name.value.trim(), file_name: pattern.value.trim() || null };
+      const kept = { ...profile, name: rigName.value.trim(), file_name: pattern.value.trim() || null };
       try {
-        await sendJson("POST", "/v1/rigs", { ...kept, kind: this.run.kind.value || profile.kind });
-        this.chosen = null;
-        if (this.shown) this.shown.rig = kept.name;
-        await this.look();
+        await sendJson("POST", "/v1/rigs", { ...kept, kind: run.kind.value || profile.kind });
+        chosen = null;
+        if (preview) preview.rig = kept.name;
+        await look();
       } catch (refused) {
         answer.replaceChildren(problemView(refused));
       }
     };
-    const ready = problem === null && !this.channelsLack() && !missing.includes("kind");
+    const ready = problem === null && !channelsLack() && !missing.includes("kind");
     return h(
       "fieldset.saving",
       h("legend", "Read the next file the same way"),
       h(
         "div.fields",
-        field(name, "Name of the rig"),
+        field(rigName, "Name of the rig"),
         field(pattern, "File names", h("small", "{cycles} stands for the duty cycles, * for any other text")),
       ),
       button("Save as rig profile", save, { disabled: !ready }),
       answer,
     );
   }
+
+  return { lead, element, decided, rig, look, sent };
 }
 
 const WIDTH = 640;

@@ -69,8 +69,8 @@ function open(batch, page) {
    * are sent without a question.
    */
   async function look() {
-    for (const { importer } of runs) await importer?.look();
-    const decided = runs.length > 0 && wrong.length === 0 && runs.every(({ importer }) => importer?.decided);
+    for (const { reading } of runs) await reading?.look();
+    const decided = runs.length > 0 && wrong.length === 0 && runs.every(({ reading }) => reading?.decided());
     const untouched = !closed() && runs.every(({ progress }) => progress === "waiting");
     if (decided && untouched && clutch.value === page.clutch) form.requestSubmit();
   }
