@@ -40,7 +40,7 @@ def module(name: str) -> Any:
 
 
 frame = module("charts/frame.js")
-bars = module("diagnosis/lifebars.js")
+bars = module("diagnosis/report.js")
 criteria = module("quantities/criteria.js")
 file_name = module("sending/file_name.js")
 shown = module("shared/format.js")

@@ -4,7 +4,7 @@
 import { Chart, chooser, setControls } from "../charts/chart.js";
 import { landscape, parameter, PARAMETER_NAMES, PARAMETERS } from "../charts/parameters.js";
 import { flat, pressuresOf, spread, surface } from "../charts/stribeck.js";
-import { levelOptions, stateOptions, usual } from "../quantities/choices.js";
+import { levelOptions, stateOptions, usual } from "../quantities/names.js";
 import { pressureLaw } from "../quantities/pressure_laws.js";
 import { within } from "../shared/dom.js";
 

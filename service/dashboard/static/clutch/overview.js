@@ -5,7 +5,7 @@
 import { Chart, chooser, setControls } from "../charts/chart.js";
 import { fan } from "../charts/fan.js";
 import { meanCof } from "../charts/life.js";
-import { levelOptions, levelsOf, usual } from "../quantities/choices.js";
+import { levelOptions, levelsOf, usual } from "../quantities/names.js";
 import { criteriaTable } from "../quantities/criteria.js";
 import { lazy } from "../quantities/lazy.js";
 import { remainingBy } from "../quantities/remaining.js";

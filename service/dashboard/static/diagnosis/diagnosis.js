@@ -1,7 +1,7 @@
 // @ts-check
 // The diagnosis: reports of the API go in; verdict, tables, charts and the buttons to run and adopt it come out.
 // Open this file first, then report.js (a report in words and tables) and charts.js (residuals and loops, before and after);
-// before the model changes, lifebars.js shows what the change means.
+// the first also shows remaining life before and after the model changes.
 
 import { read, sendJson } from "../shared/api.js";
 import { agreed } from "../shared/dialog.js";
@@ -9,8 +9,7 @@ import { button, h, quiet } from "../shared/dom.js";
 import { words } from "../shared/format.js";
 import { problemView } from "../shared/problem_view.js";
 import { charts } from "./charts.js";
-import { lifeBars } from "./lifebars.js";
-import { report as reportView } from "./report.js";
+import { lifeBars, report as reportView } from "./report.js";
 
 /** @import { BeforeAndAfter, DiagnosisListed, DiagnosisOut, ListPage, ModelName } from "../shared/types.js" */
 

@@ -6,8 +6,7 @@ import { Chart, chooser, setControls } from "../charts/chart.js";
 import { column, CYCLES, digitsColumn, HALF_OF_90, KIND } from "../charts/columns.js";
 import { eventMarks } from "../charts/layout.js";
 import { lineOf, measuredLine, titled } from "../charts/traces.js";
-import { stateOptions } from "../quantities/choices.js";
-import { INDICATORS } from "../quantities/names.js";
+import { INDICATORS, stateOptions } from "../quantities/names.js";
 import { clutchPath, Problem, read } from "../shared/api.js";
 import { fixed, percent, significant } from "../shared/format.js";
 

@@ -6,8 +6,7 @@
 import { alarms } from "../alarms/alarms.js";
 import { register } from "../sending/registration.js";
 import { sender } from "../sending/sending.js";
-import { at } from "../shared/address.js";
-import { clutchPath, read, sendJson } from "../shared/api.js";
+import { at, clutchPath, read, sendJson } from "../shared/api.js";
 import { agreed } from "../shared/dialog.js";
 import { button, byId, h, showTab } from "../shared/dom.js";
 import { age } from "../shared/format.js";

@@ -17,8 +17,7 @@ import { spread } from "../charts/stribeck.js";
 import { linesByPressure, measuredLine, titled, tracked } from "../charts/traces.js";
 import { fixed } from "../shared/format.js";
 import { pressureText } from "../shared/units.js";
-import { levelsOf } from "./choices.js";
-import { QUANTITIES } from "./names.js";
+import { levelsOf, QUANTITIES } from "./names.js";
 
 /** @import { DegradationItem, Receipt } from "../shared/types.js" */
 /** @import { Colours, Column, PlainTrace, Spec } from "../charts/types.js" */

@@ -8,10 +8,9 @@ import { Problem, read } from "../shared/api.js";
 import { h, quiet, scrolling, table } from "../shared/dom.js";
 import { cycles, interval } from "../shared/format.js";
 import { problemView } from "../shared/problem_view.js";
-import { levelOptions, usual } from "./choices.js";
 import { criterionRow, OWN_COLUMNS } from "./criteria.js";
 import { LAG_NAMES } from "./lag.js";
-import { QUANTITIES } from "./names.js";
+import { levelOptions, QUANTITIES, usual } from "./names.js";
 
 /** @import { CriterionOutcome, LoopItem, RemainingLife, StribeckItem } from "../shared/types.js" */
 

@@ -3,9 +3,22 @@
 // chapter. Open this file first (the reader's key, entity tags, errors as values), then dom.js and format.js; the shapes of
 // the API's answers are in types.d.ts.
 
-import { at, own } from "./address.js";
-
 /** @import { ListPage, ProblemError, RunOut } from "./types.js" */
+
+/** The path of the service, with a slash at its end: modules lie in assets/DIGEST/FOLDER below it. */
+const ROOT = new URL("../../../", import.meta.url).pathname;
+
+/**
+ * An address of the service, as `/docs`, where this page finds it; others as they are.
+ * @param {string} address
+ */
+export const at = (address) => (address.startsWith("/") ? ROOT + address.slice(1) : address);
+
+/** @type {(address: string) => string} the service's own address of one that an answer names */
+export const own = (address) => (address.startsWith(ROOT) ? `/${address.slice(ROOT.length)}` : address);
+
+/** The service's address for a command, without a slash at its end. */
+export const here = () => (location.origin + ROOT).replace(/\/$/, "");
 
 /**
  * What the browser keeps under a name; one that keeps nothing forgets it.

@@ -8,7 +8,7 @@
  * @typedef {Record<string, Value>} Attributes `on…` are listeners, `style` its properties, `href` may be the service's own address; null and false are left out
  */
 
-import { at } from "./address.js";
+import { at } from "./api.js";
 
 const SVG = "http://www.w3.org/2000/svg";
 

@@ -2,10 +2,9 @@
 // Polls the service: less often while errors last, not at all in a hidden tab, at once when someone looks again. How old the
 // answers are is always in sight, with words for a screen reader only when the state changes.
 
-import { Problem } from "./api.js";
-import { button, byId, h } from "./dom.js";
+import { key, Problem } from "./api.js";
+import { answered, button, byId, h, quiet } from "./dom.js";
 import { clock, seconds } from "./format.js";
-import { askForKey } from "./key.js";
 
 const MAX_WAIT = 60_000; // ms
 
@@ -122,4 +121,26 @@ export class Live {
 /** @param {Problem} problem */
 function reason({ status, detail, title }) {
   return status === 0 ? "No answer from the service" : detail || title || `Status ${status}`;
+}
+
+const ABOUT =
+  "Its operator creates a key. The scope read allows you to look; the scope ingest also allows you to send:";
+
+/** @type {(detail: string) => Promise<void>} resolves when a key has been given; `detail`: why it is asked for */
+function askForKey(detail) {
+  const input = h("input", { id: "key", type: "password", autocomplete: "off", required: true, spellcheck: "false" });
+  const form = h(
+    "form",
+    { method: "dialog" },
+    h("h2", { id: "key-title" }, "This service asks for a key"),
+    h("p", detail || ABOUT),
+    h("pre", h("code", "clutchlife key create --scope read")),
+    h("label", { for: "key" }, "Key"),
+    input,
+    quiet("It is kept in this tab until you close it, and sent to this service only."),
+    h("div.row.buttons", h("button.main", "Use this key")),
+  );
+  const dialog = h("dialog", { "aria-labelledby": "key-title" }, form);
+  dialog.addEventListener("cancel", (event) => event.preventDefault());
+  return answered(dialog, () => key.set(input.value.trim()));
 }

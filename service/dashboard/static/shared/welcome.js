@@ -1,7 +1,7 @@
 // @ts-check
 // What a first visitor sees: what to do next, and the command for it.
 
-import { here } from "./address.js";
+import { here } from "./api.js";
 import { copyable, h } from "./dom.js";
 
 /** No clutch is registered yet. */
