@@ -3,8 +3,7 @@
 
 import { fixed } from "../shared/format.js";
 import { column, CYCLES, distinct, PRESSURE } from "./columns.js";
-import { eventMarks } from "./layout.js";
-import { band, linesByPressure, titled } from "./traces.js";
+import { band, linesByPressure, planar, titled } from "./traces.js";
 
 /** @import { Receipt, RemainingLife, StribeckItem } from "../shared/types.js" */
 /** @import { Prediction } from "./fan.js" */
@@ -35,14 +34,9 @@ export function remainingCycles({ life, predictions, events }) {
     note: `The median and the 90 % interval as predicted at that time. ${comparison}${beyond}`,
     columns: [CYCLES, column("remaining cycles"), column("lower, 5 %"), column("upper, 95 %")],
     rows: predictions.map(({ at, remaining: r }) => [at, r.value, r.lower, r.upper]),
-    figure: (c) => ({
-      data: predictionTraces(made, end, top, c),
-      layout: {
-        xaxis: titled("duty cycles at the prediction"),
-        yaxis: { ...titled("remaining cycles"), range: [0, top] },
-        ...eventMarks(events, c),
-      },
-    }),
+    figure: planar("duty cycles at the prediction", { ...titled("remaining cycles"), range: [0, top] }, events, (c) =>
+      predictionTraces(made, end, top, c),
+    ),
   };
 }
 
@@ -92,9 +86,8 @@ export function meanCof({ tests, events }) {
     note: `Mean over the speeds of the first test, at ${count}, with 90 % error bars.`,
     columns: [CYCLES, PRESSURE, column("mean COF", 4), column("standard deviation", 5)],
     rows: values.map(({ cycles, pressure, value, sd }) => [cycles, pressure, value, sd]),
-    figure: (c) => ({
-      data: linesByPressure(values, { size: 5, bars: 2, text: "mean COF %{y:.4f}" }, c),
-      layout: { xaxis: titled("duty cycles"), yaxis: titled("mean COF"), ...eventMarks(events, c) },
-    }),
+    figure: planar("duty cycles", "mean COF", events, (c) =>
+      linesByPressure(values, { size: 5, bars: 2, text: "mean COF %{y:.4f}" }, c),
+    ),
   };
 }

@@ -7,7 +7,7 @@ import { named, pressureText, units } from "../shared/units.js";
 import { column, CYCLES, distinct, KIND, PRESSURE, torqueColumn } from "./columns.js";
 import { pressureRampOf, rampOf } from "./palette.js";
 import { curveOf, inUnit, measuredOf, xyOf } from "./stribeck_law.js";
-import { titled } from "./traces.js";
+import { lineOf, planar } from "./traces.js";
 
 /** @import { ClutchOut, LoopItem, StribeckItem } from "../shared/types.js" */
 /** @import { Answers } from "./stribeck.js" */
@@ -92,36 +92,25 @@ export function loopCurves({ loops, tests, clutch, channels, over, pressure, run
       ...trace.map(({ speed, torque }) => ["loop", cycles, level, speed, torque]),
       ...stationary.map(({ speed, torque }) => ["stationary curve", cycles, level, speed, torque]),
     ]),
-    figure: (c) => {
+    figure: planar("sliding speed, rpm", named(units().torque), [], (c) => {
       const colors = drawn.map((_, index) => (byState ? rampOf : pressureRampOf)(c, index, drawn.length));
-      return {
-        data: [
-          ...stationaryTraces(drawn, colors),
-          ...drawn.map(({ loop, trace }, index) => ({
-            name: label(loop),
-            mode: "lines",
-            ...xyOf(trace),
-            line: { color: colors[index], width: 1.3 },
-            hovertemplate: `${label(loop)}<br>%{x:.0f} rpm, %{y:.4~g} ${units().torque.unit}<br>${lagText(loop)}<extra></extra>`,
-          })),
-        ],
-        layout: { xaxis: titled("sliding speed, rpm"), yaxis: titled(named(units().torque)) },
-      };
-    },
+      const lines = drawn.map(({ loop, trace }, index) => {
+        const text = `${label(loop)}<br>%{x:.0f} rpm, %{y:.4~g} ${units().torque.unit}<br>${lagText(loop)}`;
+        return lineOf(label(loop), xyOf(trace), { color: colors[index], width: 1.3 }, text);
+      });
+      return [...stationaryTraces(drawn, colors), ...lines];
+    }),
   };
 }
 
 /** @type {(drawn: { stationary: CurvePoint[] }[], colors: string[]) => PlainTrace[]} named once */
 function stationaryTraces(drawn, colors) {
+  const text = `stationary curve<br>%{x:.0f} rpm, %{y:.4~g} ${units().torque.unit}`;
   const curves = drawn.map(({ stationary }, index) => ({ stationary, color: colors[index] }));
   return curves
     .filter(({ stationary }) => stationary.length > 0)
-    .map(({ stationary, color }, index) => ({
-      name: "stationary curve",
-      showlegend: index === 0,
-      mode: "lines",
-      ...xyOf(stationary),
-      line: { color, width: 2, dash: "dash" },
-      hovertemplate: `stationary curve<br>%{x:.0f} rpm, %{y:.4~g} ${units().torque.unit}<extra></extra>`,
-    }));
+    .map(({ stationary, color }, index) => {
+      const line = { color, width: 2, dash: "dash" };
+      return lineOf("stationary curve", xyOf(stationary), line, text, { showlegend: index === 0 });
+    });
 }

@@ -3,9 +3,8 @@
 
 import { estimate } from "../shared/format.js";
 import { CYCLES, intervalColumns, KIND, measuredAndLaw, PRESSURE } from "./columns.js";
-import { eventMarks } from "./layout.js";
 import { scaleOf } from "./palette.js";
-import { measuredPoints, spatialPoints, surfaceOf, titled, tracked } from "./traces.js";
+import { measuredPoints, planar, solid, spatialPoints, surfaceOf, titled, tracked } from "./traces.js";
 
 /** @import { DegradationItem, Receipt, Trajectory } from "../shared/types.js" */
 /** @import { Range, Spec } from "./types.js" */
@@ -62,17 +61,10 @@ export function parameter({ items, name, pressure, events }) {
     note: `Value when new ${initial}, total change ${change}, scale ${scale}.`,
     columns: COLUMNS,
     rows: rowsOf(item),
-    figure: (c) => ({
-      data: [
-        ...tracked(trajectory, { name: "tracked", line: { color: c.accent, width: 2 }, text: law }, c),
-        measuredPoints("identified", measured, { color: c.ink, text: "%{x:,.0f} cycles<br>%{y:.4g}" }),
-      ],
-      layout: {
-        xaxis: titled("duty cycles"),
-        yaxis: { ...titled(axisOf(name)), range: rangeOf(item) },
-        ...eventMarks(events, c),
-      },
-    }),
+    figure: planar("duty cycles", { ...titled(axisOf(name)), range: rangeOf(item) }, events, (c) => [
+      ...tracked(trajectory, { name: "tracked", line: { color: c.accent, width: 2 }, text: law }, c),
+      measuredPoints("identified", measured, { color: c.ink, text: "%{x:,.0f} cycles<br>%{y:.4g}" }),
+    ]),
   };
 }
 
@@ -115,20 +107,10 @@ export function landscape({ items, name }) {
     note: `${PARAMETERS[name].title} at every pressure. Points: identified from one test each. Surface: tracked over life. Drag to turn.`,
     columns: COLUMNS,
     rows: own.flatMap(({ item }) => rowsOf(item)),
-    figure: (c) => ({
-      data: [
-        surfaceOf(law, scaleOf(c), "%{x:,.0f} cycles, %{y} bar<br>tracked: %{z:.4g}"),
-        spatialPoints(identified, 2.6, c.ink, "%{x:,.0f} cycles, %{y} bar<br>%{z:.4g}"),
-      ],
-      layout: {
-        showlegend: false,
-        scene: {
-          xaxis: titled("duty cycles"),
-          yaxis: titled("pressure, bar"),
-          zaxis: { ...titled(axisOf(name)), range: [low, high] },
-        },
-      },
-    }),
+    figure: solid("duty cycles", "pressure, bar", { ...titled(axisOf(name)), range: [low, high] }, (c) => [
+      surfaceOf(law, scaleOf(c), "%{x:,.0f} cycles, %{y} bar<br>tracked: %{z:.4g}"),
+      spatialPoints(identified, 2.6, c.ink, "%{x:,.0f} cycles, %{y} bar<br>%{z:.4g}"),
+    ]),
   };
 }
 

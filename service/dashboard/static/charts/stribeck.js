@@ -7,7 +7,7 @@ import { named, pressureText, units } from "../shared/units.js";
 import { column, CYCLES, distinct, KIND, torqueColumn } from "./columns.js";
 import { faint, pressureRampOf, rampOf, scaleOf } from "./palette.js";
 import { curveOf, inUnit, measuredOf, xyOf } from "./stribeck_law.js";
-import { spatialPoints, surfaceOf, titled } from "./traces.js";
+import { planar, solid, spatialPoints, surfaceOf, titled } from "./traces.js";
 
 /** @import { Channels, ClutchOut, StribeckItem } from "../shared/types.js" */
 /** @import { CurvePoint } from "./stribeck_law.js" */
@@ -89,12 +89,11 @@ export function flat(answers) {
     note: place,
     columns: columnsOf(),
     rows: rowsOf(drawn),
-    figure: (c) => ({
-      data: drawn.flatMap((curve, index) =>
+    figure: planar({ ...titled("sliding speed, rpm"), rangemode: "tozero" }, named(units().torque), [], (c) =>
+      drawn.flatMap((curve, index) =>
         flatTraces(curve, label(curve), (byState ? rampOf : pressureRampOf)(c, index, drawn.length), c),
       ),
-      layout: { xaxis: { ...titled("sliding speed, rpm"), rangemode: "tozero" }, yaxis: titled(named(units().torque)) },
-    }),
+    ),
   };
 }
 
@@ -144,20 +143,11 @@ export function surface(answers) {
     note: `${place}: ${drawing}. Drag to turn.`,
     columns: columnsOf(),
     rows: rowsOf(drawn),
-    figure: (c) => ({
-      data:
-        over === "states"
-          ? states.map((cycles, index) => stateSurface(drawn, cycles, rampOf(c, index, states.length)))
-          : surfaceTraces(drawn, byPressure, c),
-      layout: {
-        showlegend: false,
-        scene: {
-          xaxis: titled("speed, rpm"),
-          yaxis: titled(byPressure ? "pressure, bar" : "duty cycles"),
-          zaxis: titled(named(units().torque)),
-        },
-      },
-    }),
+    figure: solid("speed, rpm", byPressure ? "pressure, bar" : "duty cycles", named(units().torque), (c) =>
+      over === "states"
+        ? states.map((cycles, index) => stateSurface(drawn, cycles, rampOf(c, index, states.length)))
+        : surfaceTraces(drawn, byPressure, c),
+    ),
   };
 }
 

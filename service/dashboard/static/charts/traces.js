@@ -3,16 +3,35 @@
 
 import { pressureText } from "../shared/units.js";
 import { distinct, HALF_OF_90 } from "./columns.js";
+import { eventMarks } from "./layout.js";
 import { faint, pressureRampOf } from "./palette.js";
 
-/** @import { Measured } from "../shared/types.js" */
-/** @import { Colours, ErrorBars, Line, PlainTrace, Trace } from "./types.js" */
+/** @import { Measured, Receipt } from "../shared/types.js" */
+/** @import { Axis, Colours, ErrorBars, Figure, Line, PlainTrace, Trace } from "./types.js" */
 
 /** @typedef {(number | null)[]} Values */
 /** @typedef {{ x: Values, y: Values }} Places */
 
 /** @type {(text: string) => { title: { text: string } }} the title of an axis */
 export const titled = (text) => ({ title: { text } });
+
+/** @param {string | Axis} axis */
+const axisOf = (axis) => (typeof axis === "string" ? titled(axis) : axis);
+
+/**
+ * A figure over one pair of axes, with events marked; an axis that has nothing else is its title.
+ * @type {(x: string | Axis, y: string | Axis, events: Receipt[], traces: (c: Colours) => Trace[]) => (c: Colours) => Figure}
+ */
+export const planar = (x, y, events, traces) => (c) => ({
+  data: traces(c),
+  layout: { xaxis: axisOf(x), yaxis: axisOf(y), ...eventMarks(events, c) },
+});
+
+/** @type {(x: string, y: string, z: string | Axis, traces: (c: Colours) => Trace[]) => (c: Colours) => Figure} one in 3D */
+export const solid = (x, y, z, traces) => (c) => ({
+  data: traces(c),
+  layout: { showlegend: false, scene: { xaxis: titled(x), yaxis: titled(y), zaxis: axisOf(z) } },
+});
 
 /**
  * A band between two edges, each with its own abscissae.

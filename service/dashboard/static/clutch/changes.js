@@ -120,37 +120,33 @@ export function answersOf(run) {
   return [...answers, ["other", "It is another clutch’s"]];
 }
 
-/**
- * Answer the doubts about held runs: confirmed together, otherwise one after the other.
- * @param {Answer} answer
- * @param {Receipt[]} runs
- * @returns {Promise<Done>} what was done; where one was refused, how far it came
- */
+/** @type {Record<Answer, (run: Receipt) => Promise<Done>>} */
+const ANSWERS = {
+  right: (run) => confirm(run, ""),
+  likely: (run) => correct(run, likelyCycles(run) ?? run.cycles, "wrong cycles, as the doubt suggests"),
+  other: (run) => turnRun("withdraw", run, "another clutch's run"),
+};
+
+/** @type {(answer: Answer, runs: Receipt[]) => Promise<Done>} confirmed together, otherwise one after the other */
 export async function answerDoubts(answer, runs) {
-  /** @type {Done[]} */
-  const all = [];
-  const [only] = runs;
+  const several = runs.length > 1;
+  let changed = 0;
   try {
-    if (answer === "right" && only && runs.length > 1) {
+    if (answer === "right" && several) {
       const run_ids = runs.map((run) => run.run_id);
-      await post(`${clutchPath(only.clutch_id)}/runs/confirm`, { run_ids, reason: "" });
+      await post(`${clutchPath(runs[0].clutch_id)}/runs/confirm`, { run_ids, reason: "" });
       return { text: `${runs.length} runs are confirmed.`, undo: null };
     }
-    for (const run of runs) all.push(await answerDoubt(answer, run));
+    for (const run of runs) {
+      const done = await ANSWERS[answer](run);
+      if (!several) return done;
+      changed += 1;
+    }
   } catch (problem) {
     if (!(problem instanceof Problem)) throw problem;
-    return { text: `${all.length} of ${runs.length} runs were changed: ${problem.detail}`, undo: null };
+    return { text: `${changed} of ${runs.length} runs were changed: ${problem.detail}`, undo: null };
   }
-  const [first] = all;
-  return first && runs.length === 1 ? first : { text: `${runs.length} runs were changed.`, undo: null };
-}
-
-/** @type {(answer: Answer, run: Receipt) => Promise<Done>} */
-async function answerDoubt(answer, run) {
-  if (answer === "other") return turnRun("withdraw", run, "another clutch's run");
-  const likely = likelyCycles(run);
-  if (answer === "likely" && likely !== undefined) return correct(run, likely, "wrong cycles, as the doubt suggests");
-  return confirm(run, "");
+  return { text: `${runs.length} runs were changed.`, undo: null };
 }
 
 /** @type {(run: Receipt) => Promise<Question>} */

@@ -6,7 +6,7 @@ import { column } from "../charts/columns.js";
 import { pressureRampOf } from "../charts/palette.js";
 import { flat } from "../charts/stribeck.js";
 import { measuredOf, torqueAtSpeed } from "../charts/stribeck_law.js";
-import { titled } from "../charts/traces.js";
+import { planar, titled } from "../charts/traces.js";
 import { h } from "../shared/dom.js";
 import { fixed, quantity } from "../shared/format.js";
 import { named, pressureText, units } from "../shared/units.js";
@@ -74,8 +74,8 @@ function residualsOf({ fits }, channels, clutch) {
       { name: titles[1], text: (value) => fixed(value, torque.decimals + 1) },
     ],
     rows: levels.flatMap(({ level, points }) => points.map(({ speed, left }) => [level, speed, left])),
-    figure: (c) => ({
-      data: levels.map(({ level, points }, index) => ({
+    figure: planar({ ...titled(titles[0]), rangemode: "tozero" }, titles[1], [], (c) =>
+      levels.map(({ level, points }, index) => ({
         name: pressureText(level),
         mode: "markers",
         x: points.map(({ speed }) => speed),
@@ -83,8 +83,7 @@ function residualsOf({ fits }, channels, clutch) {
         marker: { color: pressureRampOf(c, index, levels.length), size: 5 },
         hovertemplate: `%{x:.0f} rpm<br>%{y:.3g} ${torque.unit}<extra></extra>`,
       })),
-      layout: { xaxis: { ...titled(titles[0]), rangemode: "tozero" }, yaxis: titled(titles[1]) },
-    }),
+    ),
   };
 }
 
@@ -101,18 +100,15 @@ function recordOf(channels, channel) {
     note: `${fixed(values.length)} values.${long}`,
     columns: [column(along, time ? 3 : 0), column(quantity(channel), 3)],
     rows: values.map((value, index) => [x[index], value]),
-    figure: (c) => ({
-      data: [
-        {
-          name: quantity(channel),
-          mode: time ? "lines" : "lines+markers",
-          x,
-          y: values,
-          line: { color: c.accent, width: 1.2 },
-          marker: { size: 4 },
-        },
-      ],
-      layout: { xaxis: titled(along), yaxis: titled(quantity(channel)) },
-    }),
+    figure: planar(along, quantity(channel), [], (c) => [
+      {
+        name: quantity(channel),
+        mode: time ? "lines" : "lines+markers",
+        x,
+        y: values,
+        line: { color: c.accent, width: 1.2 },
+        marker: { size: 4 },
+      },
+    ]),
   };
 }

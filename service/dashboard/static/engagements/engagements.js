@@ -4,8 +4,7 @@
 
 import { Chart, chooser, setControls } from "../charts/chart.js";
 import { column, CYCLES, digitsColumn, HALF_OF_90, KIND } from "../charts/columns.js";
-import { eventMarks } from "../charts/layout.js";
-import { lineOf, measuredLine, titled } from "../charts/traces.js";
+import { lineOf, measuredLine, planar } from "../charts/traces.js";
 import { INDICATORS, stateOptions } from "../quantities/names.js";
 import { clutchPath, Problem, read } from "../shared/api.js";
 import { fixed, percent, significant } from "../shared/format.js";
@@ -48,12 +47,9 @@ function indicatorOverLife({ measured, events, name }) {
     note: `From ${fixed(values.length)} measured engagements. The 90 % error bars come from the noise of the records.`,
     columns: [CYCLES, digitsColumn(title, 4), digitsColumn("standard error", 2)],
     rows: values.map(({ x, value, sd }) => [x, value, sd]),
-    figure: (c) => ({
-      data: [
-        measuredLine(title, values, { size: 7, bars: 3, text: `%{x:,.0f} cycles<br>${title} %{y:.4g}` }, c.accent),
-      ],
-      layout: { xaxis: titled("duty cycles"), yaxis: titled(title), ...eventMarks(events, c) },
-    }),
+    figure: planar("duty cycles", title, events, (c) => [
+      measuredLine(title, values, { size: 7, bars: 3, text: `%{x:,.0f} cycles<br>${title} %{y:.4g}` }, c.accent),
+    ]),
   };
 }
 
@@ -67,10 +63,9 @@ function engagementTrace({ compared, name }) {
     note: `After ${fixed(cycles)} cycles. ${discrepancyOf(compared)}`,
     columns: [KIND, column("time since contact, s", 3), digitsColumn(title, 4)],
     rows: kinds.flatMap(({ kind, trace }) => trace.time_s.map((time, index) => [kind, time, trace[name][index]])),
-    figure: (c) => ({
-      data: kinds.map(({ kind, trace }) => traceOf(kind, trace, name, c)),
-      layout: { xaxis: titled("time since contact, s"), yaxis: titled(title) },
-    }),
+    figure: planar("time since contact, s", title, [], (c) =>
+      kinds.map(({ kind, trace }) => traceOf(kind, trace, name, c)),
+    ),
   };
 }
 

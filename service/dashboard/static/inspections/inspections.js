@@ -5,9 +5,8 @@
 
 import { Chart } from "../charts/chart.js";
 import { CYCLES, digitsColumn, distinct } from "../charts/columns.js";
-import { eventMarks } from "../charts/layout.js";
 import { rampOf } from "../charts/palette.js";
-import { titled } from "../charts/traces.js";
+import { planar } from "../charts/traces.js";
 import { readAll } from "../shared/api.js";
 import { button, h, quiet, scrolling, symbol, table } from "../shared/dom.js";
 import { files } from "../shared/files.js";
@@ -48,8 +47,8 @@ function surfaceOverLife({ items, events, quantity }) {
     note: `${meaning} Inspected at ${states === 1 ? "one number" : `${fixed(states)} different numbers`} of cycles.`,
     columns: [{ name: "lining" }, CYCLES, digitsColumn(name, 3)],
     rows: measured.map((item) => [item.lining, item.cycles, item[quantity]]),
-    figure: (c) => ({
-      data: linings.map((lining, index) => {
+    figure: planar("duty cycles", title, events, (c) =>
+      linings.map((lining, index) => {
         const values = measured.filter((item) => item.lining === lining);
         const color = rampOf(c, index, linings.length);
         return {
@@ -63,8 +62,7 @@ function surfaceOverLife({ items, events, quantity }) {
           hovertemplate: `%{x:,.0f} cycles<br>${name} %{y:.4g}<extra>%{fullData.name}</extra>`,
         };
       }),
-      layout: { xaxis: titled("duty cycles"), yaxis: titled(title), ...eventMarks(events, c) },
-    }),
+    ),
   };
 }
 

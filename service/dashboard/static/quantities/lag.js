@@ -11,10 +11,9 @@ import {
   measuredAndLaw,
   PRESSURE,
 } from "../charts/columns.js";
-import { eventMarks } from "../charts/layout.js";
 import { rampOf } from "../charts/palette.js";
 import { spread } from "../charts/stribeck.js";
-import { linesByPressure, measuredLine, titled, tracked } from "../charts/traces.js";
+import { linesByPressure, measuredLine, planar, tracked } from "../charts/traces.js";
 import { fixed } from "../shared/format.js";
 import { pressureText } from "../shared/units.js";
 import { levelsOf, QUANTITIES } from "./names.js";
@@ -79,13 +78,10 @@ export function lagOverCycles({ items, name, pressure, events }) {
     rows: items.flatMap((item) =>
       measuredAndLaw(item, { measured: "measured", law: "tracked", before: [item.pressure_bar, item.frequency_hz] }),
     ),
-    figure: (c) => ({
-      data: [
-        ...(course ? track(course, unit, c) : []),
-        ...linesByPressure(measuredOf(items), { size: 7, bars: 3, text: `%{y:.3g} ${unit}` }, c),
-      ],
-      layout: { xaxis: titled("duty cycles"), yaxis: titled(axisOf(name)), ...eventMarks(events, c) },
-    }),
+    figure: planar("duty cycles", axisOf(name), events, (c) => [
+      ...(course ? track(course, unit, c) : []),
+      ...linesByPressure(measuredOf(items), { size: 7, bars: 3, text: `%{y:.3g} ${unit}` }, c),
+    ]),
   };
 }
 
@@ -110,15 +106,14 @@ export function lagOverPressure({ items, name }) {
       const half = HALF_OF_90 * sd;
       return ["measured", pressure, items[0].frequency_hz, cycles, value, value - half, value + half];
     }),
-    figure: (c) => ({
-      data: drawn.map((state, index) => {
+    figure: planar("pressure, bar", axisOf(name), [], (c) =>
+      drawn.map((state, index) => {
         const label = `${fixed(state)} cycles`;
         const own = values.filter(({ cycles }) => cycles === state);
         const points = own.map(({ pressure, value, sd }) => ({ x: pressure, value, sd }));
         const text = `%{x:.1f} bar, ${label}<br>%{y:.3g} ${unit}`;
         return measuredLine(label, points, { size: 7, bars: 3, text }, rampOf(c, index, drawn.length));
       }),
-      layout: { xaxis: titled("pressure, bar"), yaxis: titled(axisOf(name)) },
-    }),
+    ),
   };
 }

@@ -3,7 +3,7 @@
 
 import { column, HALF_OF_90, intervalColumns, KIND } from "../charts/columns.js";
 import { axisOf, PARAMETERS } from "../charts/parameters.js";
-import { measuredPoints, titled, tracked } from "../charts/traces.js";
+import { measuredPoints, planar, tracked } from "../charts/traces.js";
 import { fixed } from "../shared/format.js";
 
 /** @import { ParameterName } from "../charts/parameters.js" */
@@ -67,20 +67,13 @@ export function pressureLaw({ test, name }) {
     note: `After ${fixed(test.cycles)} cycles. Points: identified at each pressure, with 90 % error bars. The law ${shape}; the band around it holds 90 %.`,
     columns: COLUMNS,
     rows,
-    figure: (c) => ({
-      data: [
-        ...tracked(
-          course,
-          { name: "law", line: { color: c.accent, width: 2 }, text: "%{x:.2f} bar<br>law %{y:.4g}" },
-          c,
-        ),
-        measuredPoints("identified", identified, {
-          color: c.ink,
-          text: `%{x:.2f} bar<br>${PARAMETERS[name].title} %{y:.4g}`,
-        }),
-      ],
-      layout: { xaxis: titled("pressure, bar"), yaxis: titled(axisOf(name)) },
-    }),
+    figure: planar("pressure, bar", axisOf(name), [], (c) => [
+      ...tracked(course, { name: "law", line: { color: c.accent, width: 2 }, text: "%{x:.2f} bar<br>law %{y:.4g}" }, c),
+      measuredPoints("identified", identified, {
+        color: c.ink,
+        text: `%{x:.2f} bar<br>${PARAMETERS[name].title} %{y:.4g}`,
+      }),
+    ]),
   };
 }
 

@@ -2,8 +2,7 @@
 // The shudder margin: the slope dμ/dv of the fitted curves over cycles. Below zero friction falls with speed.
 
 import { CYCLES, column, intervalColumns, KIND, measuredAndLaw, PRESSURE } from "../charts/columns.js";
-import { eventMarks } from "../charts/layout.js";
-import { measuredPoints, titled, tracked } from "../charts/traces.js";
+import { measuredPoints, planar, tracked } from "../charts/traces.js";
 import { fixed } from "../shared/format.js";
 import { pressureText } from "../shared/units.js";
 import { reachedText } from "./criteria.js";
@@ -30,13 +29,10 @@ export function shudderMargin({ items, limits, events }) {
     rows: items.flatMap((item) =>
       measuredAndLaw(item, { measured: "measured", law: "tracked", before: [item.pressure_bar, item.speed_rpm] }),
     ),
-    figure: (c) => ({
-      data: [
-        ...items.flatMap((item, index) => slopeTraces(item, [c.accent, c.check, c.normal][index % 3], c)),
-        zeroLine(items, c),
-      ],
-      layout: { xaxis: titled("duty cycles"), yaxis: titled("dμ/dv, s/m"), ...eventMarks(events, c) },
-    }),
+    figure: planar("duty cycles", "dμ/dv, s/m", events, (c) => [
+      ...items.flatMap((item, index) => slopeTraces(item, [c.accent, c.check, c.normal][index % 3], c)),
+      zeroLine(items, c),
+    ]),
   };
 }
 

@@ -12,7 +12,6 @@ import { fixed } from "./format.js";
 const CHOICE = kept(() => localStorage, "clutchlife-units");
 const PSI_PER_BAR = 14.5038;
 const LBF_FT_PER_NM = 0.737562;
-const FT_PER_M = 3.28084;
 
 /** @returns {{ system: "si" | "us", friction: "torque" | "cof" }} */
 function chosen() {
@@ -45,7 +44,7 @@ export function meanRadius({ geometry }) {
   return mm / 1000;
 }
 
-/** @returns {{ torque: Unit, pressure: Unit, velocity: Unit, plainTorque: Unit }} how values are shown now */
+/** @returns {{ torque: Unit, pressure: Unit }} how values are shown now */
 export function units() {
   const { system, friction } = chosen();
   const us = system === "us";
@@ -54,14 +53,10 @@ export function units() {
     ? { name: "friction torque", unit: "lbf·ft", decimals: 2, of: (nm) => LBF_FT_PER_NM * nm }
     : { name: "friction torque", unit: "Nm", decimals: 2, of: (nm) => nm };
   return {
-    plainTorque,
     torque: friction === "cof" ? { name: "coefficient of friction µ", unit: "", decimals: 4, of: cofOf } : plainTorque,
     pressure: us
       ? { name: "pressure", unit: "psi", decimals: 0, of: (bar) => PSI_PER_BAR * bar }
       : { name: "pressure", unit: "bar", decimals: 1, of: (bar) => bar },
-    velocity: us
-      ? { name: "speed", unit: "ft/s", decimals: 2, of: (v) => FT_PER_M * v }
-      : { name: "speed", unit: "m/s", decimals: 2, of: (v) => v },
   };
 }
 
