@@ -8,7 +8,7 @@ import { column, CYCLES, KIND } from "../charts/columns.js";
 import { PARAMETER_NAMES } from "../charts/parameters.js";
 import { spread } from "../charts/stribeck.js";
 import { curveOf, xyOf } from "../charts/stribeck_law.js";
-import { titled } from "../charts/traces.js";
+import { planar, titled } from "../charts/traces.js";
 import { levelsOf, QUANTITIES, usual } from "../quantities/names.js";
 import { clutchPath, read, readAll } from "../shared/api.js";
 import { button, byId, h } from "../shared/dom.js";
@@ -17,7 +17,7 @@ import { Live } from "../shared/live.js";
 import { heldText } from "../shared/state.js";
 import { named, placeUnits, pressureText, units } from "../shared/units.js";
 
-/** @import { Colours, PlainTrace, Spec } from "../charts/types.js" */
+/** @import { Colours, Spec } from "../charts/types.js" */
 /** @import { ClutchOut, Degradation, DegradationItem, StribeckItem } from "../shared/types.js" */
 
 /** @typedef {Awaited<ReturnType<typeof lifeOf>>} Life a life of a clutch, as it is compared, with its own tests */
@@ -108,18 +108,15 @@ function overLifeOf(lives, quantity, share) {
       ...points.x.map((at, index) => [label, "measured", at, points.y[index]]),
       ...line.x.map((at, index) => [label, "tracked", at, line.y[index]]),
     ]),
-    figure: (c) => ({
-      data: drawn.flatMap(({ label, points, line }, index) => {
+    figure: planar("duty cycles of the life", axis, [], (c) =>
+      drawn.flatMap(({ label, points, line }, index) => {
         const color = palette(c)[index % 6];
-        /** @type {PlainTrace[]} */
-        const traces = [
+        return [
           { name: label, mode: "lines", ...line, line: { color, width: 2 } },
           { name: label, showlegend: line.x.length === 0, mode: "markers", ...points, marker: { color, size: 6 } },
         ];
-        return traces;
       }),
-      layout: { xaxis: titled("duty cycles of the life"), yaxis: titled(axis) },
-    }),
+    ),
   };
 }
 
@@ -149,15 +146,14 @@ function curvesOf(lives, share) {
     note: "Fitted curves, one colour per life: solid for the first test, dashed for the middle one, dotted for the last.",
     columns: [{ name: "curve" }, column("speed, rpm"), column(axis, 4)],
     rows: drawn.flatMap((curve) => curve.points.map((point) => [curve.name, point.speed, point.torque])),
-    figure: (c) => ({
-      data: drawn.map(({ name: curve, index, state, points }) => ({
+    figure: planar({ ...titled("sliding speed, rpm"), rangemode: "tozero" }, axis, [], (c) =>
+      drawn.map(({ name: curve, index, state, points }) => ({
         name: curve,
         mode: "lines",
         ...xyOf(points),
         line: { color: palette(c)[index % 6], width: 2, ...(state > 0 ? { dash: DASHES[state] } : {}) },
       })),
-      layout: { xaxis: { ...titled("sliding speed, rpm"), rangemode: "tozero" }, yaxis: titled(axis) },
-    }),
+    ),
   };
 }
 
