@@ -16,7 +16,7 @@ import { atLeast, estimate, fixed, likely, percent, probability, roundedDown } f
 import { healthBar } from "../shared/sparkline.js";
 import { firstRun } from "../shared/welcome.js";
 import { plannedDuty } from "./planned_duty.js";
-import { heldView, lifeWarnings, warningsView } from "./warnings.js";
+import { heldView, warningsView } from "./warnings.js";
 
 /** @import { Content } from "../shared/dom.js" */
 /** @import { ClutchOut, CourseShare, CriterionOutcome, DegradationItem, Receipt, RemainingLife } from "../shared/types.js" */
@@ -71,8 +71,8 @@ export function overviewTab(place, page) {
     const [shown, degradation] = await Promise.all([reader.forecast(), reader.degradation()]);
     // what held runs would change, the remaining life says
     const further = degradation.warnings.filter(({ code }) => code !== "held_runs");
-    const odd = lifeWarnings({ warned: [...life.warnings, ...further], tests });
-    top.replaceChildren(...parts, odd.length > 0 ? h("section", { id: "warnings" }, warningsView(odd)) : "");
+    const odd = [...life.warnings, ...further];
+    top.replaceChildren(...parts, odd.length > 0 ? h("section", { id: "warnings" }, warningsView(odd, tests)) : "");
     forecast.show(fan(shown));
     drawShudder();
   }

@@ -10,8 +10,6 @@ import { actionsOf, answerDoubts, answersOf, askRun, LABELS } from "./changes.js
 /** @import { Receipt, StribeckItem, Warned } from "../shared/types.js" */
 /** @import { Page } from "./clutch.js" */
 
-/** @typedef {{ code: string, message: string, test: StribeckItem | null }} LifeWarning */
-
 const OFF_TRACK = "off_track";
 
 /** @type {Record<string, { title: string, help: string }>} */
@@ -46,30 +44,19 @@ const CODES = {
   },
 };
 
-/**
- * The warnings of the present life, those of its last test with their run.
- * @param {{ warned: Warned[], tests: StribeckItem[] }} answers `warned`: of remaining life and degradation
- * @returns {LifeWarning[]}
- */
-export function lifeWarnings({ warned, tests }) {
-  const last = tests.filter((test) => test.fits.some((fit) => fit.mean_cof !== null)).at(-1) ?? null;
-  return warned.map(({ code, message }) => ({ code, message, test: code === OFF_TRACK ? last : null }));
-}
-
-/** @param {LifeWarning[]} warned */
-export function warningsView(warned) {
-  const codes = [...new Set(warned.map(({ code }) => code))];
-  const items = codes.map((code) => {
+/** @type {(warned: Warned[], tests: StribeckItem[]) => HTMLElement} what is odd about the life; one about its last test names that */
+export function warningsView(warned, tests) {
+  const last = tests.filter((test) => test.fits.some((fit) => fit.mean_cof !== null)).at(-1);
+  const items = [...new Set(warned.map(({ code }) => code))].map((code) => {
     const { title, help } = CODES[code] ?? { title: words(code), help: "" };
-    const own = warned.filter((warning) => warning.code === code);
-    const sentences = own.map(({ message, test }) =>
-      test
-        ? [
-            runLink({ ...test, kind: "stationary_stribeck" }),
-            `: ${sentence(message.replace(/^the last test's/, "its"), false)} `,
-          ]
-        : `${sentence(message)} `,
-    );
+    const run = code === OFF_TRACK && last && { ...last, kind: "stationary_stribeck" };
+    const sentences = warned
+      .filter((warning) => warning.code === code)
+      .map(({ message }) =>
+        run
+          ? [runLink(run), `: ${sentence(message.replace(/^the last test's/, "its"), false)} `]
+          : `${sentence(message)} `,
+      );
     return h("li", h("b", `${title}. `), sentences.flat(), help && h("span.quiet", help));
   });
   return h("div.notice.odd", h("h2.hidden", "Warnings"), h("ul", items));
