@@ -22,8 +22,11 @@ import { named, placeUnits, pressureText, units } from "../shared/units.js";
 
 /** @typedef {Awaited<ReturnType<typeof lifeOf>>} Life a life of a clutch, as it is compared, with its own tests */
 
-/** Quantities that every stationary test gives, and how many states of a life are drawn. */
-const CHOICES = ["mean_cof", ...PARAMETER_NAMES];
+/** @type {[string, string][]} quantities that every stationary test gives */
+const CHOICES = ["mean_cof", ...PARAMETER_NAMES].map((key) => [key, QUANTITIES[key].title]);
+/** @type {[string, string][]} */
+const VALUES = Object.entries({ share: "normalised to new", measured: "as measured" });
+/** How many states of a life are drawn. */
 const STATES = 3;
 const DASHES = ["solid", "dash", "dot"];
 const name = () => "comparison";
@@ -191,21 +194,8 @@ function drawForm(lives) {
     h("form.row.finding", { onsubmit: add }, h("label", { for: "add" }, "Add"), input, h("button", "Add")),
     h(
       "div.row.controls",
-      choice(
-        "Quantity",
-        CHOICES.map((key) => [key, QUANTITIES[key].title]),
-        quantity,
-        (value) => go((query) => query.set("quantity", value)),
-      ),
-      choice(
-        "Values",
-        [
-          ["share", "normalised to new"],
-          ["measured", "as measured"],
-        ],
-        share ? "share" : "measured",
-        (value) => go((query) => query.set("as", value)),
-      ),
+      choice("Quantity", CHOICES, quantity, (value) => go((query) => query.set("quantity", value))),
+      choice("Values", VALUES, share ? "share" : "measured", (value) => go((query) => query.set("as", value))),
     ),
   );
 }

@@ -119,20 +119,12 @@ export const symbol = (letter, index) => h("span", letter, h("sub", index));
  */
 export function table(caption, columns, rows, { shown = false } = {}) {
   const header = columns.map((name) => h("th", { scope: "col" }, name));
-  return h(
-    "table",
-    h("caption", { class: shown ? null : "hidden" }, caption),
-    h("thead", h("tr", header)),
-    h(
-      "tbody",
-      rows.map((row) =>
-        h(
-          "tr",
-          row.map((cell) => h("td", cell ?? "–")),
-        ),
-      ),
-    ),
-  );
+  const lines = rows.map((row) => {
+    const cells = row.map((cell) => h("td", cell ?? "–"));
+    return h("tr", cells);
+  });
+  const title = h("caption", { class: shown ? null : "hidden" }, caption);
+  return h("table", title, h("thead", h("tr", header)), h("tbody", lines));
 }
 
 /** @type {(label: string, ...content: Content[]) => HTMLElement} a place that scrolls, by keyboard too */

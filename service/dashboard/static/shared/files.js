@@ -21,13 +21,11 @@ export function files(name, address) {
 }
 
 /** @type {(name: string, rows: Cell[][]) => HTMLElement} the first row is the header; `name`: of the file */
-export const rowFiles = (name, rows) =>
-  h(
-    "span.saved",
-    ["csv", "xlsx"].map((format) =>
-      button(format.toUpperCase(), () => saveTable(`${name}.${format}`, rows), { class: "link" }),
-    ),
-  );
+export function rowFiles(name, rows) {
+  const link = (/** @type {string} */ format) =>
+    button(format.toUpperCase(), () => saveTable(`${name}.${format}`, rows), { class: "link" });
+  return h("span.saved", link("csv"), link("xlsx"));
+}
 
 /** @type {(name: string, rows: Cell[][]) => void} the first row is the header; the name's ending is the format */
 export function saveTable(name, rows) {
