@@ -57,15 +57,13 @@ def evaluate_loops(
     contributes to the lag's deviation. The curve nearest in pressure within a level's width is used; without one, a loop has
     area and direction but no lag. Times that run backwards are sorted.
     """
-    order = np.argsort(record.time, kind="stable")
-    time, pressure = record.time[order], record.pressure[order]
-    velocity, torque = geometry.sliding_velocity(record.speed[order]), record.torque[order]
-    loops = []
-    for stretch in pressure_stretches(time, pressure):
+    record = record.take(np.argsort(record.time, kind="stable"))
+    velocity, loops = geometry.sliding_velocity(record.speed), []
+    for stretch in pressure_stretches(record.time, record.pressure):
         rows = slice(stretch.start, stretch.stop)
         level = float(levels_of(np.array([stretch.pressure]))[0])
-        mean = float(pressure[rows].mean())
-        loops.append(_loop(level, time[rows], velocity[rows], torque[rows], _nearest(stationary, mean)))
+        curve = _nearest(stationary, float(record.pressure[rows].mean()))
+        loops.append(_loop(level, record.time[rows], velocity[rows], record.torque[rows], curve))
     return tuple(loops)
 
 

@@ -94,27 +94,24 @@ class _Stretch:
 def binned_loops(record: Record, geometry: Geometry) -> tuple[list[BinnedLoop], list[str]]:
     """The loops of a record that can be evaluated, those without pressure too, and a sentence for each that cannot (none for
     a pause between pressures)."""
-    order = np.argsort(record.time, kind="stable")
-    time, pressure = record.time[order], record.pressure[order]
-    velocity, torque = geometry.sliding_velocity(record.speed[order]), record.torque[order]
-    temperature = None if record.oil_temperature is None else record.oil_temperature[order]
-    rise = plate_rise(record)
+    record = record.take(np.argsort(record.time, kind="stable"))
+    velocity, rise = geometry.sliding_velocity(record.speed), plate_rise(record)
     loops: list[BinnedLoop] = []
     notes: list[str] = []
     before: Cycle | None = None
-    for stretch in pressure_stretches(time, pressure):
+    for stretch in pressure_stretches(record.time, record.pressure):
         step = max(1, (stretch.stop - stretch.start) // 4000)
         rows = slice(stretch.start, stretch.stop, step)
         sign = -1.0 if np.median(velocity[rows]) < 0 else 1.0
         samples = _Stretch(
-            time=time[rows],
+            time=record.time[rows],
             velocity=sign * velocity[rows],
-            torque=sign * torque[rows],
+            torque=sign * record.torque[rows],
             pressure=stretch.pressure,
             sign=sign,
-            temperature=float("nan") if temperature is None else float(temperature[rows].mean()),
-            plate_rise=None if rise is None else rise[order][rows],
-            test_start=float(time[0]),
+            temperature=math.nan if record.oil_temperature is None else float(record.oil_temperature[rows].mean()),
+            plate_rise=None if rise is None else rise[rows],
+            test_start=float(record.time[0]),
         )
         cycle = _speed_cycle(samples.time, samples.velocity, before)
         if not isinstance(cycle, str):

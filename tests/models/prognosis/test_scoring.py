@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.integrate import quad
 from scipy.stats import norm
 
 from models.prognosis.back_cast import BackCast, kept_after
@@ -25,17 +24,6 @@ from tests.models.tracking.tracked_series import PRIOR, draws_of
 # --- Scores against closed forms and hand-worked cases.
 
 LEVELS = (0.05, 0.1, 0.25, 0.5, 0.75, 0.9, 0.95)
-
-
-@pytest.mark.parametrize("truth", [-2.0, 0.0, 0.7, 3.0])
-def test_crps_of_a_normal(truth: float) -> None:
-    """The closed form of Gneiting and Raftery, and the definition ∫ (F(x) - 1{x >= truth})² dx, by an even sample: the
-    discreteness of 20,000 points leaves 1e-4."""
-    closed = truth * (2 * norm.cdf(truth) - 1) + 2 * norm.pdf(truth) - 1 / math.sqrt(math.pi)
-    defined = quad(lambda x: norm.cdf(x) ** 2, -12, truth)[0] + quad(lambda x: norm.sf(x) ** 2, truth, 12)[0]
-    sample = norm.ppf((np.arange(20_000) + 0.5) / 20_000)
-    assert crps_of_sample(sample, np.ones(20_000), truth) == pytest.approx(closed, abs=2e-4)
-    assert defined == pytest.approx(closed, abs=1e-6)
 
 
 def test_crps_takes_weights_as_repeated_draws() -> None:
