@@ -24,7 +24,7 @@ from models.diagnosis.design.design import Points, build_design, points_of
 from models.diagnosis.design.facts import REFERENCES, Facts, facts_of
 from models.diagnosis.effects.catalogue import BY_SLUG
 from models.diagnosis.effects.effect import Discrepancy, Kind
-from models.diagnosis.effects.fitted_effect import Draw, FittedEffect, Ranges, drawn_change
+from models.diagnosis.effects.fitted_effect import Draw, FittedEffect, Ranges
 
 #: Plateaus are handed on in parts of this many: a design takes no more of one run.
 _PART = 2000
@@ -105,7 +105,7 @@ class Extension:
                         shape=tuple(stored["shape"]),
                         factors=tuple(stored["factors"]),
                     )
-                    change += drawn_change(drawn, scenes[draw["laws"]], ranges)
+                    change += drawn.drawn(scenes[draw["laws"]], ranges)
                     if lost := np.count_nonzero(~np.isfinite(change)):
                         raise NotFiniteError(
                             f"the change of {effect.slug} is not finite at {lost} of {change.size} points"

@@ -218,6 +218,12 @@ class Scene:
     by_velocity: FloatArray  # ∂S/∂v [Nm s/m]
 
     @property
+    def life(self) -> FloatArray:
+        """The share [P] of the measured life that has gone, 0 before its first state."""
+        gone = (self.points.cycles - self.facts.states[0]) / self.facts.life
+        return np.asarray(np.maximum(gone, 0.0), dtype=np.float64)
+
+    @property
     def by_pressure(self) -> FloatArray:
         """∂S/∂p [P] Nm/Pa along the laws."""
         slopes = self.laws.by_pressure(self.points.pressure, self.points.cycles)

@@ -13,7 +13,7 @@ from models.arrays import FloatArray
 from models.diagnosis.baseline.prediction import Prediction
 from models.diagnosis.design.design import Design
 from models.diagnosis.design.facts import Facts
-from models.diagnosis.effects.effect import Effect, Shape, begins, sized, unit_changes
+from models.diagnosis.effects.effect import Effect, Shape, begins
 from models.diagnosis.effects.history import ACCELERATED_WEAR, LOAD_SEVERITY, OIL_CHANGE, REST_RECOVERY, RUNNING_IN
 from models.diagnosis.effects.moving import INERTIA_TORQUE, SHAFT_RIPPLE, SQUEEZE_FILM, STICK_SLIP
 from models.diagnosis.effects.readings import CHANNEL_DELAY, PRESSURE_OFFSET, TORQUE_ZERO_SHIFT, UNSETTLED_DWELL
@@ -44,7 +44,7 @@ BY_SLUG = {effect.slug: effect for effect in CATALOGUE}
 
 def effects_for(facts: Facts, without: frozenset[str] = frozenset()) -> list[Effect]:
     """The effects with the priors that fit this campaign's clutch; those whose slugs are in `without` are left out."""
-    return [sized(effect, facts) for effect in CATALOGUE if effect.slug not in without]
+    return [effect.sized(facts) for effect in CATALOGUE if effect.slug not in without]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -91,7 +91,7 @@ def columns_at_rows(design: Design, prediction: Prediction, columns: Sequence[Co
     changes = list[tuple[FloatArray, bool]]()
     for _, alike in groupby(starts.items(), key=lambda start: start[0][0]):
         group = [(effect, shape) for (_, shape), (_, effect) in alike]
-        unit = unit_changes(group[0][0], prediction.scene, [shape for _, shape in group])
+        unit = group[0][0].unit_changes(prediction.scene, [shape for _, shape in group])
         changes += [(unit[:, i], effect.lags(shape)) for i, (effect, shape) in enumerate(group)]
     onsets = np.array([column.effect.onset(column.shape) for column in columns])
     at_rows = change_columns(design, prediction, changes)[:, places]

@@ -157,6 +157,41 @@ class Effect:
             return self.before_lag
         return any(value >= parameter.lags_from for value, parameter in zip(shape, self.shapes, strict=False))
 
+    def sized(self, facts: Facts) -> "Effect":
+        """The effect with the prior that fits this campaign's clutch."""
+        if self.grows_with is None:
+            return self
+        of_torque = facts.usual_torque / criteria.USUAL_TORQUE
+        factor = of_torque if self.grows_with is Measure.TORQUE else facts.usual_pressure / criteria.USUAL_PRESSURE
+        return replace(self, prior_sd=self.prior_sd * factor)
+
+    def unit_changes(self, scene: Scene, shapes: Sequence[Shape]) -> FloatArray:
+        """The changes [P, m] Nm of a small amplitude, per unit: the columns that a linear screen works with."""
+        step = 1e-3 * self.prior_sd
+        return self.changes(scene, [(step, shape) for shape in shapes]) / step
+
+    def amplitude_cost(self, amplitude: float) -> float:
+        """-ln p(a)/p(0) [nats]."""
+        squared = (amplitude / self.prior_sd) ** 2
+        if math.isinf(self.tails):
+            return 0.5 * squared
+        return 0.5 * (self.tails + 1.0) * math.log1p(squared / self.tails)
+
+    def amplitude_precision(self, amplitude: float) -> float:
+        """(d cost/da)/a, in 1/unit²: what a normal prior with the same slope at a would have."""
+        if math.isinf(self.tails):
+            return float(self.prior_sd**-2.0)
+        return float((self.tails + 1.0) / (self.tails * self.prior_sd**2 + amplitude**2))
+
+    @property
+    def log_amplitude_peak(self) -> float:
+        """ln(p(0) √(2π)) [nats], with a in its unit."""
+        peak = -math.log(self.prior_sd)
+        if math.isinf(self.tails):
+            return peak
+        half = 0.5 * self.tails
+        return peak + math.lgamma(half + 0.5) - math.lgamma(half) - 0.5 * math.log(half)
+
 
 def begins(effect: Effect) -> Effect:
     """An effect whose last shape is the cycle from which on it is at work: from the start or from a state on, the one as
@@ -197,47 +232,8 @@ def begins(effect: Effect) -> Effect:
     )
 
 
-def sized(effect: Effect, facts: Facts) -> Effect:
-    """The effect with the prior that fits this campaign's clutch."""
-    if effect.grows_with is None:
-        return effect
-    of_torque = facts.usual_torque / criteria.USUAL_TORQUE
-    factor = of_torque if effect.grows_with is Measure.TORQUE else facts.usual_pressure / criteria.USUAL_PRESSURE
-    return replace(effect, prior_sd=effect.prior_sd * factor)
-
-
-def unit_changes(effect: Effect, scene: Scene, shapes: Sequence[Shape]) -> FloatArray:
-    """The changes [P, m] Nm of a small amplitude, per unit: the columns that a linear screen works with."""
-    step = 1e-3 * effect.prior_sd
-    return effect.changes(scene, [(step, shape) for shape in shapes]) / step
-
-
 #: Deviations of the two normal distributions that approximate p where everything is linear, in s; each has half the weight.
 SCALES = (1.0, 6.0)
-
-
-def amplitude_cost(effect: Effect, amplitude: float) -> float:
-    """-ln p(a)/p(0) [nats]."""
-    squared = (amplitude / effect.prior_sd) ** 2
-    if math.isinf(effect.tails):
-        return 0.5 * squared
-    return 0.5 * (effect.tails + 1.0) * math.log1p(squared / effect.tails)
-
-
-def amplitude_precision(effect: Effect, amplitude: float) -> float:
-    """(d cost/da)/a, in 1/unit²: what a normal prior with the same slope at a would have."""
-    if math.isinf(effect.tails):
-        return float(effect.prior_sd**-2.0)
-    return float((effect.tails + 1.0) / (effect.tails * effect.prior_sd**2 + amplitude**2))
-
-
-def log_amplitude_peak(effect: Effect) -> float:
-    """ln(p(0) √(2π)) [nats], with a in its unit."""
-    peak = -math.log(effect.prior_sd)
-    if math.isinf(effect.tails):
-        return peak
-    half = 0.5 * effect.tails
-    return peak + math.lgamma(half + 0.5) - math.lgamma(half) - 0.5 * math.log(half)
 
 
 def followed(target: FloatArray, points: Points, settling: float) -> FloatArray:
@@ -272,9 +268,3 @@ def lagging(target: FloatArray, frequency: FloatArray, time: float) -> FloatArra
 def flattening(life: FloatArray, share: float) -> FloatArray:
     """A course x (1 + s)/(x + s) over a share x [n] of life, 1 at its end: half done after about s."""
     return life * (1.0 + share) / (life + share)
-
-
-def life_of(scene: Scene) -> FloatArray:
-    """The share [P] of the measured life that has gone, 0 before its first state."""
-    gone = (scene.points.cycles - scene.facts.states[0]) / scene.facts.life
-    return np.asarray(np.maximum(gone, 0.0), dtype=np.float64)

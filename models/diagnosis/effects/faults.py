@@ -15,7 +15,7 @@ from models.arrays import FloatArray
 from models.diagnosis.baseline.laws import Scene, curve
 from models.diagnosis.design.design import CLOCK, CYCLES, PRESSURE, SPEED, IntArray
 from models.diagnosis.design.facts import Facts
-from models.diagnosis.effects.effect import CREEPS, Effect, Kind, Shape, ShapeParameter, Tried, begins, life_of
+from models.diagnosis.effects.effect import CREEPS, Effect, Kind, Shape, ShapeParameter, Tried, begins
 from models.friction.stribeck import PARAMETER_NAMES
 
 #: The first shape of a gain over life says whether it steps (at the cycle that follows) or creeps (by the power).
@@ -52,7 +52,7 @@ def _gains_with_life(facts: Facts) -> tuple[Tried, ...]:
 def _gain_with_life(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
     """a S from a cycle on, or a S (ζ/ζ_last)^q [P] Nm."""
     course, value = shape
-    share = np.where(scene.points.cycles > value, 1.0, 0.0) if course == _STEP else life_of(scene) ** value
+    share = np.where(scene.points.cycles > value, 1.0, 0.0) if course == _STEP else scene.life**value
     return np.asarray(amplitude * share * scene.curve, dtype=np.float64)
 
 

@@ -24,11 +24,13 @@ from models.arrays import FloatArray
 from models.diagnosis.baseline.laws import BLOCKS, RAISED, Laws, Scene
 from models.diagnosis.baseline.prediction import Prediction, predict
 from models.diagnosis.design.design import Design, Points
-from models.diagnosis.effects.effect import Discrepancy, Effect, Kind, Shape, amplitude_precision
+from models.diagnosis.effects.effect import Discrepancy, Effect, Kind, Shape
 from models.friction.criteria import Z90
 
 #: Steps of the differences: shares of the prior deviation and of a shape's range; and of a law's largest value.
 _STEP, _RAISE = 1e-3, 1e-6
+#: Along what φ is uncertain: the lowest value and the range in a campaign.
+Ranges: TypeAlias = Mapping[Discrepancy, tuple[float, float]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,28 +47,59 @@ class FittedEffect:
         """Whether the amplitude of a one-sided effect is negative."""
         return self.effect.positive and self.amplitude < 0
 
+    def rows(self, design: Design, prediction: Prediction) -> FloatArray:
+        """The change [N] Nm at the rows."""
+        change = self.effect.change(prediction.scene, self.amplitude, self.shape)
+        return prediction.change_at_rows(design, change, before_lag=self.effect.lags(self.shape))
 
-def effect_rows(design: Design, prediction: Prediction, fitted: FittedEffect) -> FloatArray:
-    """The change [N] Nm of an effect at the rows."""
-    change = fitted.effect.change(prediction.scene, fitted.amplitude, fitted.shape)
-    return prediction.change_at_rows(design, change, before_lag=fitted.effect.lags(fitted.shape))
-
-
-def effect_columns(design: Design, prediction: Prediction, fitted: FittedEffect) -> FloatArray:
-    """∂change/∂(amplitude, smooth shapes) [N, 1 + s] at the rows, by central differences."""
-    effect, ends = fitted.effect, list[tuple[float, Shape]]()
-    deltas = [_STEP * effect.prior_sd]
-    ends += [(fitted.amplitude + side * deltas[0], fitted.shape) for side in (1.0, -1.0)]
-    for index, parameter in enumerate(effect.shapes):
-        if parameter.smooth:
-            deltas.append(_STEP * (parameter.highest - parameter.lowest))
+    def columns(self, design: Design, prediction: Prediction) -> FloatArray:
+        """∂change/∂(amplitude, smooth shapes) [N, 1 + s] at the rows, by central differences."""
+        effect, ends = self.effect, list[tuple[float, Shape]]()
+        deltas = [_STEP * effect.prior_sd]
+        ends += [(self.amplitude + side * deltas[0], self.shape) for side in (1.0, -1.0)]
+        for place in self.smooth_places:
+            deltas.append(_STEP * (effect.shapes[place].highest - effect.shapes[place].lowest))
             for side in (1.0, -1.0):
-                shape = list(fitted.shape)
-                shape[index] += side * deltas[-1]
-                ends.append((fitted.amplitude, tuple(shape)))
-    changes = effect.changes(prediction.scene, ends)
-    columns = (changes[:, ::2] - changes[:, 1::2]) / (2 * np.array(deltas))
-    return prediction.change_at_rows(design, columns, before_lag=effect.lags(fitted.shape))
+                shape = list(self.shape)
+                shape[place] += side * deltas[-1]
+                ends.append((self.amplitude, tuple(shape)))
+        changes = effect.changes(prediction.scene, ends)
+        columns = (changes[:, ::2] - changes[:, 1::2]) / (2 * np.array(deltas))
+        return prediction.change_at_rows(design, columns, before_lag=effect.lags(self.shape))
+
+    @property
+    def precisions(self) -> FloatArray:
+        """1/sd² of the priors on (amplitude, smooth shapes) [1 + s]; that of the amplitude where it is."""
+        widths = [0.5 * (shape.highest - shape.lowest) for _, shape in self.effect.smooth(self.shape)]
+        return np.array([self.effect.amplitude_precision(self.amplitude), *(width**-2.0 for width in widths)])
+
+    @property
+    def smooth_places(self) -> list[int]:
+        """Which of its shapes are smooth."""
+        return [place for place, shape in enumerate(self.effect.shapes) if shape.smooth]
+
+    @property
+    def free(self) -> NDArray[np.bool_]:
+        """Which of (amplitude, smooth shapes) [1 + s] a refit may move: shapes at a bound stay there."""
+        margins = [
+            min(value - shape.lowest, shape.highest - value) / (shape.highest - shape.lowest)
+            for value, shape in self.effect.smooth(self.shape)
+        ]
+        return np.array([True, *(margin > 0.01 for margin in margins)])  # fits stop exactly there
+
+    def discrepancy_columns(self, design: Design, prediction: Prediction) -> FloatArray:
+        """∂torque/∂b [N, m] Nm."""
+        return self.rows(design, prediction)[:, None] * discrepancy_factors(design, self.effect)
+
+    def drawn(self, scene: Scene, ranges: Ranges) -> FloatArray:
+        """Change of torque [P] Nm in a draw. A course that is followed far enough ends friction; it does not reverse it."""
+        change = self.effect.change(scene, self.amplitude, self.shape)
+        if any(self.factors):
+            factors = np.concatenate(
+                [factors_at(scene.points, self.effect, ranges), small_factors_at(scene.points, ranges)], axis=1
+            )
+            change = change * (1.0 + factors @ np.array(self.factors))
+        return np.maximum(change, -scene.curve) if self.effect.kind is Kind.COURSE else change
 
 
 def law_columns(design: Design, prediction: Prediction, effects: Sequence[FittedEffect]) -> FloatArray:
@@ -80,53 +113,20 @@ def law_columns(design: Design, prediction: Prediction, effects: Sequence[Fitted
     scene, changes = prediction.scene, np.zeros((design.rows.run.size, RAISED))
     moving = [one for one in effects if one.effect.grows_with is None or one.effect.lags(one.shape)]
     sizes = [*np.abs(scene.parameters).max(axis=0).tolist(), 1.0][: BLOCKS if prediction.lag is None else RAISED]
-    before = [effect_rows(design, prediction, one) for one in moving]
+    before = [one.rows(design, prediction) for one in moving]
     for place, size in enumerate(sizes if moving else ()):
         by = _RAISE * (size or 1.0)
         parameters = scene.parameters + by * (np.arange(BLOCKS) == place)
         raised = predict(design, scene.laws.raised(place, by), parameters)
         for one, change in zip(moving, before, strict=True):
-            changes[:, place] += (effect_rows(design, raised, one) - change) / by
+            changes[:, place] += (one.rows(design, raised) - change) / by
     return prediction.jacobian(design, changes)
 
 
-def effect_precisions(fitted: FittedEffect) -> FloatArray:
-    """1/sd² of the priors on (amplitude, smooth shapes) [1 + s]; that of the amplitude where it is."""
-    widths = [0.5 * (shape.highest - shape.lowest) for _, shape in fitted.effect.smooth(fitted.shape)]
-    return np.array([amplitude_precision(fitted.effect, fitted.amplitude), *(width**-2.0 for width in widths)])
-
-
-def smooth_places(effect: Effect) -> list[int]:
-    """Which of an effect's shapes are smooth."""
-    return [place for place, shape in enumerate(effect.shapes) if shape.smooth]
-
-
-def free_shapes(fitted: FittedEffect) -> NDArray[np.bool_]:
-    """Which of (amplitude, smooth shapes) [1 + s] a refit may move: shapes at a bound stay there."""
-    margins = [
-        min(value - shape.lowest, shape.highest - value) / (shape.highest - shape.lowest)
-        for value, shape in fitted.effect.smooth(fitted.shape)
-    ]
-    return np.array([True, *(margin > 0.01 for margin in margins)])  # fits stop exactly there
-
-
-#: Along what φ is uncertain: the lowest value and the range in a campaign.
-Ranges: TypeAlias = Mapping[Discrepancy, tuple[float, float]]
 #: Orders of the cosines by which an effect's form is uncertain, and of those by which any template may be a little off;
 #: and the harmonics of a loop of the latter.
 _ORDERS = {Discrepancy.SPEED: 2}  # one in all others
 _SMALL = {Discrepancy.SPEED: 4, Discrepancy.PRESSURE: 2, Discrepancy.LIFE: 3, Discrepancy.CLOCK: 3}
-
-
-def drawn_change(drawn: FittedEffect, scene: Scene, ranges: Ranges) -> FloatArray:
-    """Change of torque [P] Nm. A course that is followed far enough ends friction; it does not reverse it."""
-    change = drawn.effect.change(scene, drawn.amplitude, drawn.shape)
-    if any(drawn.factors):
-        factors = np.concatenate(
-            [factors_at(scene.points, drawn.effect, ranges), small_factors_at(scene.points, ranges)], axis=1
-        )
-        change = change * (1.0 + factors @ np.array(drawn.factors))
-    return np.maximum(change, -scene.curve) if drawn.effect.kind is Kind.COURSE else change
 
 
 def ranges_of(rows: Points) -> Ranges:
@@ -176,11 +176,6 @@ def _coordinates(points: Points) -> dict[Discrepancy, FloatArray]:
 def discrepancy_factors(design: Design, effect: Effect) -> FloatArray:
     """φ [N, m] at the rows of a campaign."""
     return factors_at(design.rows, effect, ranges_of(design.rows))
-
-
-def discrepancy_columns(design: Design, prediction: Prediction, fitted: FittedEffect) -> FloatArray:
-    """∂torque/∂b [N, m] Nm of an effect as it is fitted."""
-    return effect_rows(design, prediction, fitted)[:, None] * discrepancy_factors(design, fitted.effect)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

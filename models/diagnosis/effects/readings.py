@@ -24,7 +24,6 @@ from models.diagnosis.effects.effect import (
     Tried,
     by_loop,
     flattening,
-    life_of,
 )
 from models.relaxation import recursion
 
@@ -79,7 +78,7 @@ def _torque_zero_shift_change(scene: Scene, amplitude: float, shape: Shape) -> F
     elif course == SETTLING:
         share = -np.expm1(-np.maximum(clock, 0.0) / (value * np.exp(off[0])))
     else:
-        life = _days_of(scene) if course in {DAYS, EVEN_DAYS, FLATTENING_DAYS} else life_of(scene)
+        life = _days_of(scene) if course in {DAYS, EVEN_DAYS, FLATTENING_DAYS} else scene.life
         share = flattening(life, value) if course in {FLATTENING, FLATTENING_DAYS} else life**value
         if course in {LIFE, DAYS}:
             share = share + np.interp(life, KNOTS, [0.0, *off, 0.0])
@@ -90,9 +89,9 @@ def _days_of(scene: Scene) -> FloatArray:
     """The share [P] of the campaign's days that has gone; where a test was not timed, of its cycles."""
     facts, moment = scene.facts, scene.points.moment
     if facts.first_moment is None or facts.last_moment is None:
-        return life_of(scene)
+        return scene.life
     gone = np.maximum((moment - facts.first_moment) / (facts.last_moment - facts.first_moment), 0.0)
-    return np.where(np.isnan(moment), life_of(scene), gone)
+    return np.where(np.isnan(moment), scene.life, gone)
 
 
 TORQUE_ZERO_SHIFT = Effect(
@@ -165,7 +164,7 @@ def _pressure_offset_change(scene: Scene, amplitude: float, shape: Shape) -> Flo
     elif course == OFFSET_STEP:
         share = np.where(cycles > value, 1.0, 0.0)
     else:
-        life = life_of(scene)
+        life = scene.life
         share = life ** math.exp(log_power) if course == OFFSET_GROWING else flattening(life, value)
     pressed = np.maximum(scene.points.pressure + amplitude * share, 0.0)  # nothing pulls the plates apart
     as_read = scene.curve_at(pressure=scene.points.pressure)  # by the same law below the lowest level

@@ -21,14 +21,7 @@ from models.diagnosis import criteria
 from models.diagnosis.baseline.laws import OPEN_DRAG
 from models.diagnosis.baseline.prediction import Prediction, predict
 from models.diagnosis.design.design import Design
-from models.diagnosis.effects.fitted_effect import (
-    effect_columns,
-    effect_precisions,
-    effect_rows,
-    factors_at,
-    free_shapes,
-    ranges_of,
-)
+from models.diagnosis.effects.fitted_effect import factors_at, ranges_of
 from models.diagnosis.pooled_fit.gauss_newton import Fit
 from models.diagnosis.pooled_fit.problem import FitProblem
 from models.diagnosis.pooled_fit.projection import Gram, gram_of, project
@@ -90,12 +83,12 @@ class CandidateDistances:
         for fit, prediction, mine in zip(self._fits, predictions, torques, strict=True):
             own, precisions = [], []
             for effect in fit.effects:
-                changes = effect_rows(design, prediction, effect)
+                changes = effect.rows(design, prediction)
                 discrepancy = changes[:, None] * factors_at(design.rows, effect.effect, self._ranges)
-                free = free_shapes(effect)
-                own += [effect_columns(design, prediction, effect)[:, free], discrepancy]
+                free = effect.free
+                own += [effect.columns(design, prediction)[:, free], discrepancy]
                 precisions += [
-                    *effect_precisions(effect)[free],
+                    *effect.precisions[free],
                     *[criteria.DISCREPANCY_SD**-2.0] * discrepancy.shape[1],
                 ]
             apart = np.stack([torque - mine for torque in torques], axis=1)
@@ -110,7 +103,7 @@ class CandidateDistances:
 
 def _torque(design: Design, prediction: Prediction, fit: Fit) -> FloatArray:
     """[N] Nm of a candidate at the rows."""
-    changes = [effect_rows(design, prediction, effect) for effect in fit.effects]
+    changes = [effect.rows(design, prediction) for effect in fit.effects]
     return np.asarray(prediction.torque + sum(changes, np.zeros_like(prediction.torque)), dtype=np.float64)
 
 

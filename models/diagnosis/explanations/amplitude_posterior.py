@@ -18,7 +18,6 @@ import numpy as np
 
 from models.arrays import FloatArray
 from models.diagnosis.design.design import IntArray
-from models.diagnosis.effects.effect import amplitude_precision
 from models.diagnosis.effects.fitted_effect import FittedEffect
 from models.gaussian_evidence import independent, log_sum
 
@@ -110,7 +109,7 @@ def _along_amplitude(
     fixed, sloped = vectors.T @ (sd * score[1:]), vectors.T @ (sd * info[1:, 0])
     # a jointly normal (a, c), and the exact template beside it; rounding aside no less than the amplitude's own prior
     left = np.array([info[0, 0] - (sloped**2 / (1 + values)).sum(), info[0, 0]])
-    left = np.maximum(left, amplitude_precision(fitted.effect, fitted.amplitude))
+    left = np.maximum(left, fitted.effect.amplitude_precision(fitted.amplitude))
     middle = (score[0] - np.array([(sloped * fixed / (1 + values)).sum(), 0.0])) / left
     low, high = middle - _REACH * left**-0.5, middle + _REACH * left**-0.5
     steps = np.unique([*np.linspace(low.min(), high.max(), _WIDE), *np.linspace(low[1], high[1], _NEAR)])

@@ -18,15 +18,7 @@ from scipy.special import erfcx
 from models.arrays import FloatArray
 from models.diagnosis import criteria
 from models.diagnosis.design.design import Design
-from models.diagnosis.effects.effect import log_amplitude_peak
-from models.diagnosis.effects.fitted_effect import (
-    discrepancy_factors,
-    effect_precisions,
-    effect_rows,
-    free_shapes,
-    ranges_of,
-    small_factors_at,
-)
+from models.diagnosis.effects.fitted_effect import discrepancy_factors, ranges_of, small_factors_at
 from models.diagnosis.explanations.contrasts import contrasts_of
 from models.diagnosis.noise.covariance import Noise
 from models.diagnosis.pooled_fit.gauss_newton import Fit
@@ -118,7 +110,7 @@ def template_errors(design: Design, fitted: Fit) -> tuple[list[FloatArray], Floa
 
 def off_by(design: Design, fitted: Fit, factors: Sequence[FloatArray]) -> FloatArray:
     """The changes [N, Σ m] Nm by every factor [N, m] with which the effects may be off."""
-    rows = [effect_rows(design, fitted.prediction, effect) for effect in fitted.effects]
+    rows = [effect.rows(design, fitted.prediction) for effect in fitted.effects]
     changes = [change[:, None] * effect_factors for change, effect_factors in zip(rows, factors, strict=True)]
     return np.concatenate([np.zeros((design.torque.size, 0)), *changes], axis=1)
 
@@ -150,7 +142,7 @@ def _likeliest(projected: Projected, mine: FloatArray) -> FloatArray:
 
 def _log_prior(fitted: Fit) -> float:
     """The normalisation of the priors of the effects' amplitudes and smooth shapes [nats]."""
-    logs = [log_amplitude_peak(e.effect) + 0.5 * float(np.log(effect_precisions(e)[1:]).sum()) for e in fitted.effects]
+    logs = [e.effect.log_amplitude_peak + 0.5 * float(np.log(e.precisions[1:]).sum()) for e in fitted.effects]
     return sum(logs) + float(np.log(2.0)) * sum(e.effect.positive for e in fitted.effects)
 
 
@@ -161,7 +153,7 @@ def _held_at_bounds(gram: Gram, first: int, fitted: Fit) -> tuple[Gram, FloatArr
     for effect in fitted.effects:
         smooth = effect.effect.smooth(effect.shape)
         out = np.array([1.0, *(1.0 if 2 * x > shape.lowest + shape.highest else -1.0 for x, shape in smooth)])
-        ways += np.where(free_shapes(effect), 0.0, out).tolist()
+        ways += np.where(effect.free, 0.0, out).tolist()
     outward = np.array(ways)
     at_bound = first + np.flatnonzero(outward)
     order = np.concatenate(

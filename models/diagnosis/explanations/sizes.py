@@ -19,14 +19,7 @@ import numpy as np
 from models.arrays import FloatArray
 from models.diagnosis import criteria
 from models.diagnosis.effects.effect import Tried
-from models.diagnosis.effects.fitted_effect import (
-    Draw,
-    FittedEffect,
-    effect_columns,
-    effect_precisions,
-    effect_rows,
-    smooth_places,
-)
+from models.diagnosis.effects.fitted_effect import Draw, FittedEffect
 from models.diagnosis.explanations.amplitude_posterior import Proportional
 from models.diagnosis.explanations.evidence import evidence_of, off_by, projections_beside, template_errors
 from models.diagnosis.explanations.verdict import Judgement
@@ -73,10 +66,10 @@ class _Component:
 
     def effects(self, off: FloatArray) -> tuple[FittedEffect, ...]:
         """The effects at one sample [m]."""
-        drawn, at, after = [], 0, sum(1 + len(smooth_places(fitted.effect)) for fitted in self.fit.effects)
+        drawn, at, after = [], 0, sum(1 + len(fitted.smooth_places) for fitted in self.fit.effects)
         for fitted, last in zip(self.fit.effects, self.last, strict=True):
             shape = list(fitted.shape)
-            for place, move in zip(smooth_places(fitted.effect), off[at + 1 :], strict=False):
+            for place, move in zip(fitted.smooth_places, off[at + 1 :], strict=False):
                 parameter = fitted.effect.shapes[place]
                 shape[place] = float(np.clip(shape[place] + move, parameter.lowest, parameter.highest))
             amplitude = fitted.amplitude + float(off[at])
@@ -88,7 +81,7 @@ class _Component:
                     factors=tuple(off[after : after + last.size].tolist()),
                 )
             )
-            at, after = at + 1 + len(smooth_places(fitted.effect)), after + last.size
+            at, after = at + 1 + len(fitted.smooth_places), after + last.size
         return tuple(drawn)
 
     def sizes(self, drawn: Sequence[FittedEffect]) -> list[float]:
@@ -232,7 +225,7 @@ def _components_of(problem: FitProblem, fitted: Fit, weight: float, rng: np.rand
     errors = off_by(design, fitted, factors)
     gram = replace(gram_of(problem, fitted, errors), base=free)
     effects, places = fitted.effects, np.arange(len(fitted.effects))
-    priors = [np.array([np.inf, *(effect_precisions(effect)[1:] ** -0.5)]) for effect in effects]
+    priors = [np.array([np.inf, *(effect.precisions[1:] ** -0.5)]) for effect in effects]
     of_shapes, of_errors = [prior.size for prior in priors], [off.shape[1] for off in factors]
     shapes, of = np.concatenate(priors), np.concatenate([np.repeat(places, of_shapes), np.repeat(places, of_errors)])
     supposed = []
@@ -246,8 +239,8 @@ def _components_of(problem: FitProblem, fitted: Fit, weight: float, rng: np.rand
     steady = design.closed & design.rows.steady
     states = design.rows.cycles[steady]
     last, first = steady & (design.rows.cycles == states.max()), steady & (design.rows.cycles == states.min())
-    columns = np.concatenate([*(effect_columns(design, fitted.prediction, e) for e in effects), errors], axis=1)
-    whole = np.sum([effect_rows(design, fitted.prediction, effect) for effect in effects], axis=0)
+    columns = np.concatenate([*(e.columns(design, fitted.prediction) for e in effects), errors], axis=1)
+    whole = np.sum([effect.rows(design, fitted.prediction) for effect in effects], axis=0)
     rising = columns[last].mean(axis=0) - columns[first].mean(axis=0)
     trend = float(whole[last].mean() - whole[first].mean())
     at_end = tuple(own_factors[last].mean(axis=0) for own_factors in factors)

@@ -19,15 +19,8 @@ from models.diagnosis import criteria
 from models.diagnosis.baseline.laws import BLOCK, BLOCKS, COURSE, ENDS, LOG_CURVATURE, LOG_DECAY, POWERS, SHARES, Laws
 from models.diagnosis.baseline.prediction import Prediction, predict
 from models.diagnosis.design.design import Design
-from models.diagnosis.effects.effect import SCALES, amplitude_cost
-from models.diagnosis.effects.fitted_effect import (
-    FittedEffect,
-    effect_columns,
-    effect_precisions,
-    effect_rows,
-    law_columns,
-    smooth_places,
-)
+from models.diagnosis.effects.effect import SCALES
+from models.diagnosis.effects.fitted_effect import FittedEffect, law_columns
 from models.diagnosis.noise.covariance import whitening
 from models.diagnosis.pooled_fit.problem import FitProblem, Priors
 
@@ -127,13 +120,13 @@ def _evaluated(problem: FitProblem, white: Whiten, laws: Laws, effects: tuple[Fi
         prediction = predict(design, laws)
         torque = prediction.torque.copy()
         for effect in effects:
-            torque += effect_rows(design, prediction, effect)
+            torque += effect.rows(design, prediction)
         residual = design.torque - torque
         cost = float("inf")
         if np.isfinite(residual).all():
             cost = 0.5 * float((white(residual[:, None]) ** 2).sum())
             cost += 0.5 * float(((priors.rows @ laws.theta - priors.means) ** 2).sum())
-            cost = sum((amplitude_cost(effect.effect, effect.amplitude) for effect in effects), cost)
+            cost = sum((effect.effect.amplitude_cost(effect.amplitude) for effect in effects), cost)
     return Fit(
         laws=laws,
         prediction=prediction,
@@ -148,7 +141,7 @@ def _evaluated(problem: FitProblem, white: Whiten, laws: Laws, effects: tuple[Fi
 def sensitivities(problem: FitProblem, fitted: Fit) -> FloatArray:
     """∂torque/∂(free θ, then amplitude and smooth shapes of each effect) [N, m]."""
     design, prediction = problem.design, fitted.prediction
-    of_effects = [effect_columns(design, prediction, effect) for effect in fitted.effects]
+    of_effects = [effect.columns(design, prediction) for effect in fitted.effects]
     of_laws = law_columns(design, prediction, fitted.effects)[:, problem.priors.free]
     return np.concatenate([of_laws, *of_effects], axis=1)
 
@@ -156,7 +149,7 @@ def sensitivities(problem: FitProblem, fitted: Fit) -> FloatArray:
 def prior_gram(priors: Priors, fitted: Fit) -> FloatArray:
     """What priors add [m + 1, m + 1] to the Gram matrix of (sensitivities, residual)."""
     rows, off = priors.rows[:, priors.free], priors.means - priors.rows @ fitted.laws.theta
-    free, own = rows.shape[1], [effect_precisions(effect) for effect in fitted.effects]
+    free, own = rows.shape[1], [effect.precisions for effect in fitted.effects]
     gram = np.diag(np.concatenate([np.zeros(free), *own, [0.0]]))
     gram[:free, :free] = rows.T @ rows
     gram[:free, -1] = rows.T @ off
@@ -165,7 +158,7 @@ def prior_gram(priors: Priors, fitted: Fit) -> FloatArray:
         gram[at, -1] = -precisions[0] * effect.amplitude
         at += precisions.size
     gram[-1] = gram[:, -1]
-    costs = (2.0 * amplitude_cost(effect.effect, effect.amplitude) for effect in fitted.effects)
+    costs = (2.0 * effect.effect.amplitude_cost(effect.amplitude) for effect in fitted.effects)
     gram[-1, -1] = sum(costs, float(off @ off))
     return gram
 
@@ -198,7 +191,7 @@ def _moved(state: Fit, priors: Priors, step: FloatArray) -> tuple[Laws, tuple[Fi
         size = fitted.amplitude + float(step[at])
         at += 1
         shape = list(fitted.shape)
-        for index in smooth_places(fitted.effect):
+        for index in fitted.smooth_places:
             parameter = fitted.effect.shapes[index]
             shape[index] = float(np.clip(shape[index] + step[at], parameter.lowest, parameter.highest))
             at += 1

@@ -25,7 +25,6 @@ from scipy.special import log_softmax, logsumexp
 
 from models.arrays import FloatArray
 from models.diagnosis import criteria
-from models.diagnosis.effects.fitted_effect import discrepancy_columns, effect_precisions
 from models.diagnosis.noise.covariance import Noise, gains_of, modes, whitened
 from models.diagnosis.pooled_fit.gauss_newton import Fit, prior_gram, sensitivities
 from models.diagnosis.pooled_fit.problem import FitProblem
@@ -61,7 +60,7 @@ def gram_of(problem: FitProblem, fit: Fit, changes: FloatArray | None = None, *,
     design, noise = problem.design, problem.noise
     changes = np.zeros((design.torque.size, 0)) if changes is None else changes
     jacobian = sensitivities(problem, fit)
-    off = [] if exact else [discrepancy_columns(design, fit.prediction, effect) for effect in fit.effects]
+    off = [] if exact else [effect.discrepancy_columns(design, fit.prediction) for effect in fit.effects]
     white = whitened(np.column_stack([jacobian, *off, changes, fit.residual]), design, noise)
     gains = gains_of(design, fit.torque, noise)
     matrix = white.T @ white
@@ -151,7 +150,7 @@ def amplitude_deviations(problem: FitProblem, fitted: Fit) -> list[float]:
     """Standard deviations of the amplitudes of the fit's effects, everything else free."""
     gram = gram_of(problem, fitted, exact=False)
     inverse = gram.covariance(problem.noise.run_gain, problem.noise.curve_gain)
-    sizes = [0, *(effect_precisions(effect).size for effect in fitted.effects[:-1])]
+    sizes = [0, *(effect.precisions.size for effect in fitted.effects[:-1])]
     places = int(problem.priors.free.sum()) + np.cumsum(sizes)[: len(fitted.effects)]
     return [float(np.sqrt(max(inverse[place, place], 0.0))) for place in places]
 

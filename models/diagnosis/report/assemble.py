@@ -10,7 +10,7 @@ import numpy as np
 from models.diagnosis import criteria
 from models.diagnosis.design.design import Design
 from models.diagnosis.effects.catalogue import BY_SLUG
-from models.diagnosis.effects.effect import FROM_THE_START, sized
+from models.diagnosis.effects.effect import FROM_THE_START
 from models.diagnosis.effects.faults import FAULT_BY_SLUG
 from models.diagnosis.effects.fitted_effect import Estimate, ranges_of
 from models.diagnosis.experiments.test_plan import Advice
@@ -59,7 +59,7 @@ def candidates_of(
             estimate, evidence = records[slug].estimate, records[slug].log_evidence
             estimate = replace(estimate, value=_finite(estimate.value), sd=_finite(estimate.sd))
         else:  # screened only, or an oil temperature that was not measured
-            estimate = _estimate(slug, 0.0, sized(BY_SLUG[slug], problem.design.facts).prior_sd)
+            estimate = _estimate(slug, 0.0, BY_SLUG[slug].sized(problem.design.facts).prior_sd)
         candidates.append(
             Candidate(
                 effect=slug,

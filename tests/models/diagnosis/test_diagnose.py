@@ -10,7 +10,7 @@ from models.diagnosis.campaign import Campaign, MaintenanceEvent, StationaryRun
 from models.diagnosis.campaign import EventKind as Event
 from models.diagnosis.design.design import build_design
 from models.diagnosis.effects.catalogue import BY_SLUG, CATALOGUE
-from models.diagnosis.effects.effect import Measure, sized
+from models.diagnosis.effects.effect import Measure
 from models.diagnosis.explanations.verdict import Verdict
 from models.friction.stribeck import torque
 from models.records.runs import Plateaus
@@ -215,7 +215,7 @@ def test_what_grows_with_the_clutch_is_as_large_as_the_clutch() -> None:
     facts = build_design(stretched(stretched(given, "torque"), "pressure")).facts
     known = build_design(given).facts
     for effect in CATALOGUE:
-        ratio = sized(effect, facts).prior_sd / sized(effect, known).prior_sd
+        ratio = effect.sized(facts).prior_sd / effect.sized(known).prior_sd
         assert ratio == pytest.approx(FACTOR if effect.grows_with else 1.0)
     assert BY_SLUG["torque_zero_shift"].grows_with is Measure.TORQUE
     assert BY_SLUG["pressure_offset"].grows_with is Measure.PRESSURE

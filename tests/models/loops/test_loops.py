@@ -117,6 +117,7 @@ def test_pressures_in_any_order_with_ramps():
         [lagging] * 4, pressures, rng=np.random.default_rng(2), noise=0.005, ramp=1.5, lost=0.01, jitter=0.3, spikes=3
     )
     found = evaluate_loops(many, GEOMETRY, None)
+    assert evaluate_loops(many.take(np.random.default_rng(3).permutation(many.time.size)), GEOMETRY, None) == found
     assert [loop.pressure for loop in found] == pressures
     for loop in found:
         assert loop.periods == 1

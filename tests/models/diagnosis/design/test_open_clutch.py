@@ -11,7 +11,6 @@ from models.diagnosis.campaign import Campaign, StationaryRun
 from models.diagnosis.criteria import SURE, WORTHWHILE
 from models.diagnosis.design.design import Design, build_design, mark_open, points_of
 from models.diagnosis.effects.catalogue import CATALOGUE
-from models.diagnosis.effects.effect import unit_changes
 from models.diagnosis.experiments.candidates import PASSES, TRIALS, runs_of, with_trial
 from models.diagnosis.experiments.test_plan import advise
 from models.diagnosis.explanations.contrasts import contrasts_of
@@ -122,7 +121,7 @@ def test_only_inertia_and_a_zero_are_left_of_the_catalogue(effect, given: Study)
         at = replace(scene, facts=facts)
         tried = effect.grid(facts)
         if tried:
-            columns = unit_changes(effect, at, [each.shape for each in tried])
+            columns = effect.unit_changes(at, [each.shape for each in tried])
             assert np.isfinite(columns).all()
             assert (np.abs(columns[opened]).max() > 0) == (effect.slug in {"inertia_torque", "torque_zero_shift"})
 

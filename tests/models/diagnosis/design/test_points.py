@@ -44,14 +44,15 @@ def missed(loop: BinnedLoop, expected: FloatArray) -> float:
     ("periods", "held", "back"), [(1.5, 0.0, 0.0), (2.1, 2.0, 0.8), (2.0, 5.0, 0.0), (1.3, 1.0, 0.5), (2.1, 3.0, 1.5)]
 )
 def test_only_the_swing_is_binned(periods: float, held: float, back: float) -> None:
-    """A record of three pressures, between which speed is held and brought back; torque hangs on speed alone."""
+    """A record of three pressures, between which speed is held and brought back, its samples in any order; torque hangs on
+    speed alone."""
     speed = speed_of(0.1, periods, held, back)
     pressures = np.repeat([4e5, 5e5, 6e5], speed.size)
     rpm = np.tile(speed, 3)
     velocity = GEOMETRY.sliding_velocity(rpm * RPM)
     time, torque = np.arange(rpm.size) / RATE, torque_at(velocity) * pressures / 5e5
     record = Record(time=time, pressure=pressures, speed=rpm * RPM, torque=torque)
-    loops, notes = binned_loops(record, GEOMETRY)
+    loops, notes = binned_loops(record.take(np.random.default_rng(1).permutation(time.size)), GEOMETRY)
     assert [loop.pressure for loop in loops] == [4e5, 5e5, 6e5]
     assert not notes
     for loop in loops:

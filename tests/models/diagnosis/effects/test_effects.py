@@ -18,22 +18,9 @@ from models.diagnosis.campaign import Campaign, DutyRun, EventKind, MaintenanceE
 from models.diagnosis.criteria import DISCREPANCY_SD
 from models.diagnosis.design.facts import facts_of
 from models.diagnosis.effects.catalogue import BY_SLUG, CATALOGUE
-from models.diagnosis.effects.effect import (
-    Effect,
-    Kind,
-    amplitude_cost,
-    amplitude_precision,
-    log_amplitude_peak,
-    unit_changes,
-)
+from models.diagnosis.effects.effect import Effect, Kind
 from models.diagnosis.effects.faults import last_direction
-from models.diagnosis.effects.fitted_effect import (
-    FittedEffect,
-    discrepancy_columns,
-    discrepancy_factors,
-    effect_rows,
-    law_columns,
-)
+from models.diagnosis.effects.fitted_effect import FittedEffect, discrepancy_factors, law_columns
 from models.diagnosis.effects.history import BY_CLOCK, BY_USE, STATIC, WHOLE
 from models.diagnosis.effects.moving import FILM, FIRST_ORDER, LEAST_TIME, MOST_POWER, THICKNESS, usual_slope
 from models.diagnosis.effects.readings import DAYS, STRAIGHT
@@ -59,7 +46,7 @@ def test_no_amplitude_no_change_and_all_changes_are_finite(effect: Effect, scene
     scattered = scene_of_laws(scene.laws, replace(scene.points, pressure=pressure), scene.facts)
     # a film that stands is slow whatever its time
     moving = scene.points.velocity > 0.01 * scene.points.velocity.max()
-    columns = unit_changes(effect, scene, [tried.shape for tried in grid]).T if grid else np.zeros((0, 0))
+    columns = effect.unit_changes(scene, [tried.shape for tried in grid]).T if grid else np.zeros((0, 0))
     for tried, column in zip(grid, columns, strict=True):
         for at in (scene, scattered):
             assert np.abs(effect.change(at, 0.0, tried.shape)).max() < 1e-9
@@ -191,7 +178,7 @@ def test_the_direction_is_that_of_the_last_change(values: list[float], breaks: l
 @pytest.mark.parametrize("effect", [*CATALOGUE, replace(BY_SLUG["oil_change"], tails=float("inf"))])
 def test_the_prior_is_students_density_or_a_normal_one(effect: Effect) -> None:
     def density(a: float) -> float:
-        return float(np.exp(log_amplitude_peak(effect) - amplitude_cost(effect, a)) / np.sqrt(2 * np.pi))
+        return float(np.exp(effect.log_amplitude_peak - effect.amplitude_cost(a)) / np.sqrt(2 * np.pi))
 
     total = quad(lambda u: density(u * effect.prior_sd) * effect.prior_sd, -np.inf, np.inf)[0]
     assert total == pytest.approx(1.0, abs=1e-6)
@@ -206,8 +193,8 @@ def test_the_precision_is_the_slope_of_the_cost(tails):
     effect = replace(BY_SLUG["oil_change"], tails=tails)
     for a in (-3.0, 0.01, 0.4):
         step = 1e-6
-        slope = (amplitude_cost(effect, a + step) - amplitude_cost(effect, a - step)) / (2 * step)
-        assert amplitude_precision(effect, a) * a == pytest.approx(slope, rel=1e-5)
+        slope = (effect.amplitude_cost(a + step) - effect.amplitude_cost(a - step)) / (2 * step)
+        assert effect.amplitude_precision(a) * a == pytest.approx(slope, rel=1e-5)
 
 
 # --- Model discrepancy of templates, structure that has more evidence than any effect, and noise that does not
@@ -242,7 +229,7 @@ def test_a_fit_knows_that_effects_change_with_the_friction_that_they_change(give
 
     def model(theta: FloatArray) -> FloatArray:
         prediction = predict(design, replace(laws, theta=theta))
-        return prediction.torque + effect_rows(design, prediction, loud)
+        return prediction.torque + loud.rows(design, prediction)
 
     wanted = []
     for place in free.tolist():
@@ -261,8 +248,8 @@ def test_a_discrepancy_absorbs_what_a_template_misses_as_far_as_its_prior_allows
     drag = BY_SLUG["hydrodynamic_drag"]
     fitted = of_size("hydrodynamic_drag", 1.5, (1.0, 0.0, 0.0, 0.0))
     baseline = given.baseline
-    change = effect_rows(given.design, baseline.fit.prediction, fitted)
-    extra = discrepancy_columns(given.design, baseline.fit.prediction, fitted)[:, :1].sum(axis=1)
+    change = fitted.rows(given.design, baseline.fit.prediction)
+    extra = fitted.discrepancy_columns(given.design, baseline.fit.prediction)[:, :1].sum(axis=1)
     stiff = replace(fitted, effect=replace(drag, discrepancies=()))
 
     def left(each: FittedEffect, by: float) -> float:

@@ -10,7 +10,6 @@ from models.diagnosis.campaign import Campaign, DutyRun, DynamicRun
 from models.diagnosis.criteria import WORTHWHILE
 from models.diagnosis.design.design import build_design
 from models.diagnosis.effects.catalogue import BY_SLUG
-from models.diagnosis.effects.fitted_effect import effect_rows
 from models.diagnosis.effects.readings import STRAIGHT
 from models.diagnosis.effects.thermal import AT_ONCE
 from models.diagnosis.experiments.candidates import OIL_SETTLING, PASSES, TRIALS, steps_of, with_trial
@@ -118,7 +117,7 @@ def with_measured(given: Campaign, key: str, truth: Fit) -> Campaign:
     at = build_design(then)
     at = replace(at, facts=replace(at.facts, reference_temperature=358.15))
     prediction = predict(at, truth.laws)
-    torque = prediction.torque + sum(effect_rows(at, prediction, each) for each in truth.effects)
+    torque = prediction.torque + sum(each.rows(at, prediction) for each in truth.effects)
     torque = torque * (1 + 0.01 * np.random.default_rng(9).standard_normal(torque.size))
     count = then.stationary[-1].plateaus.torque.size
     last = replace(then.stationary[-1].plateaus, torque=torque[-count:])

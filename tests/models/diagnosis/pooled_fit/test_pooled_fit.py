@@ -9,7 +9,7 @@ from models.arrays import FloatArray
 from models.diagnosis.baseline.laws import BLOCK
 from models.diagnosis.design.design import build_design
 from models.diagnosis.effects.catalogue import BY_SLUG
-from models.diagnosis.effects.effect import FROM_THE_START, amplitude_cost
+from models.diagnosis.effects.effect import FROM_THE_START
 from models.diagnosis.effects.fitted_effect import FittedEffect
 from models.diagnosis.effects.thermal import AT_ONCE
 from models.diagnosis.pooled_fit.baseline_fit import fit_baseline
@@ -73,7 +73,7 @@ def test_the_gradient_of_the_priors_is_the_slope_of_their_cost(given: Study, bes
     priors, (heat,), theta = given.problem.priors, beside_heat.effects, beside_heat.laws.theta
 
     def cost(theta: FloatArray, amplitude: float) -> float:
-        return 0.5 * float(np.square(priors.rows @ theta - priors.means).sum()) + amplitude_cost(heat.effect, amplitude)
+        return 0.5 * float(np.square(priors.rows @ theta - priors.means).sum()) + heat.effect.amplitude_cost(amplitude)
 
     slopes = -prior_gram(priors, beside_heat)[:-1, -1]
     free = np.flatnonzero(priors.free)

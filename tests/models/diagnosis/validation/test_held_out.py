@@ -12,8 +12,7 @@ from models.diagnosis.design.autocorrelation import Correlation
 from models.diagnosis.design.design import CYCLES as BY_CYCLES
 from models.diagnosis.design.design import PHASE, PRESSURE, SPEED
 from models.diagnosis.effects.catalogue import BY_SLUG
-from models.diagnosis.effects.effect import amplitude_precision
-from models.diagnosis.effects.fitted_effect import FittedEffect, effect_columns, law_columns
+from models.diagnosis.effects.fitted_effect import FittedEffect, law_columns
 from models.diagnosis.effects.thermal import AT_ONCE
 from models.diagnosis.pooled_fit.gauss_newton import Fit, fit
 from models.diagnosis.validation import held_out
@@ -111,7 +110,7 @@ def test_states_ahead_are_predicted_with_the_parameters_uncertainty(warm):
     for model in (given.baseline.fit, extended):
         masked = given.problem.with_noise(held_out._without(noise, out))
         found = fit(masked, model.laws, model.effects, steps=FEW_STEPS)
-        own = [effect_columns(given.design, found.prediction, each) for each in found.effects]
+        own = [each.columns(given.design, found.prediction) for each in found.effects]
         laws = law_columns(given.design, found.prediction, found.effects)
         jacobian = np.concatenate([laws[:, priors.free], *own], axis=1)
         unit = jacobian / noise.deviation[:, None]
@@ -121,7 +120,7 @@ def test_states_ahead_are_predicted_with_the_parameters_uncertainty(warm):
         if own:
             (each,) = found.effects  # half the width of a shape's bounds is its prior's deviation
             widths = [0.5 * (shape.highest - shape.lowest) for _, shape in each.effect.smooth(each.shape)]
-            weak = [amplitude_precision(each.effect, each.amplitude), *(width**-2.0 for width in widths)]
+            weak = [each.effect.amplitude_precision(each.amplitude), *(width**-2.0 for width in widths)]
             precision[[-3, -2, -1], [-3, -2, -1]] += weak
         scale = 1 / np.sqrt(np.diag(precision))
         spread = np.linalg.inv(precision * scale[:, None] * scale) * scale[:, None] * scale
