@@ -81,12 +81,13 @@ class Explanation:
 
 
 def probabilities_by_slug(explanations: Iterable[Explanation]) -> dict[str, float]:
-    """The probability that each effect of the catalogue is at work, alone or beside others; largest first."""
+    """The probability that each effect of the catalogue is at work, alone or beside others; largest first, by slug where
+    they are equal."""
     shares: dict[str, float] = {}
     for explanation in explanations:
         for slug in set(explanation.effects) - {UNCATALOGUED}:
             shares[slug] = min(shares.get(slug, 0.0) + explanation.probability, 1.0)
-    return dict(sorted(shares.items(), key=lambda item: -item[1]))
+    return dict(sorted(shares.items(), key=lambda item: (-item[1], item[0])))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -107,6 +107,7 @@ def listed(shares: dict[tuple[str, ...], float]) -> tuple[Explanation, ...]:
         ({("a",): 0.95, (): 0.05}, Verdict.CAUSE_NAMED, ("a",)),
         ({("a",): 0.6, ("a", "b"): 0.4}, Verdict.CAUSE_NAMED, ("a",)),
         ({("a", "b"): 0.95, ("a",): 0.05}, Verdict.CAUSE_NAMED, ("a", "b")),
+        ({tuple("hgfedcba"): 1.0}, Verdict.CAUSE_NAMED, tuple("abcdefgh")),  # of equal ones the order is that of names
         ({("a",): 0.45, ("a", "b"): 0.3, ("a", "c"): 0.25}, Verdict.CAUSE_AMBIGUOUS, ("a", "b", "c")),
         ({("a",): 0.6, ("b",): 0.35, (): 0.05}, Verdict.CAUSE_AMBIGUOUS, ("a", "b")),
         ({("a",): 0.85, (U,): 0.15}, Verdict.CAUSE_AMBIGUOUS, ("a", U)),
@@ -119,9 +120,7 @@ def listed(shares: dict[tuple[str, ...], float]) -> tuple[Explanation, ...]:
     ],
 )
 def test_verdict(shares: dict[tuple[str, ...], float], verdict: Verdict, causes: tuple[str, ...]) -> None:
-    found = decide(listed(shares))
-    assert found[0] is verdict
-    assert set(found[1]) == set(causes)
+    assert decide(listed(shares)) == (verdict, causes)
 
 
 # --- An outlying run is named; an effect that all runs show makes none of them an outlier.
