@@ -21,8 +21,8 @@ from tests.support import stationary
 COUNTED = ("service", "storage")
 PRESSURES = (4.0, 5.0, 6.0)
 EARLIER_RUNS = 4
-#: Threads that look for jobs and keep hold of them, and the one that looks for what receivers of alarms are to be sent.
-JOBS: Set[str] = {"jobs", "lease", "outbox"}
+#: Threads that look for jobs and keep hold of them, at the workers, and for what receivers of alarms are to be sent.
+JOBS: Set[str] = {"jobs", "lease", "outbox", "workers"}
 
 
 def entered(errand: Callable[[TestClient, str], None], *, warm: bool = True, but: Set[str] = JOBS) -> list[str]:

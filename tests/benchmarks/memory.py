@@ -53,6 +53,12 @@ def family_seconds(pid: int) -> float:
     return _total(pid, processor_seconds)
 
 
+def busy_seconds() -> float:
+    """Seconds of the processors that the machine has worked since it was started."""
+    user, nice, system, _, _, *interrupts = map(int, Path("/proc/stat").read_text(encoding="ascii").split()[1:9])
+    return (user + nice + system + sum(interrupts[:2])) / os.sysconf("SC_CLK_TCK")
+
+
 def _total(pid: int, of: Callable[[int], float]) -> float:
     total = 0.0
     for number in family(pid):

@@ -9,7 +9,7 @@ from pathlib import Path
 import httpx2
 import numpy as np
 
-from tests.benchmarks.memory import added, processor_seconds
+from tests.benchmarks.memory import added, family_seconds
 from tests.measuring import show
 from tests.models.records.raw_records import RPM, make, protocol
 from tests.service.readers.sample_files import UNITS, write_mdf, write_parquet, write_tdms
@@ -60,9 +60,9 @@ def records() -> None:
                 grown = added(server.pid, partial(_posted, client, path, 0))
                 taken, worked = [], []
                 for number in range(1, _TIMES + 1):
-                    before = processor_seconds(server.pid)
+                    before = family_seconds(server.pid)
                     taken.append(_posted(client, path, number))
-                    worked.append(processor_seconds(server.pid) - before)
+                    worked.append(family_seconds(server.pid) - before)
             rows.append(
                 {
                     "file": name,

@@ -27,7 +27,8 @@ FEW_SPEEDS = ("oil_temperature", "torque_zero_shift", "pressure_offset", "accele
 
 @dataclass(frozen=True)
 class Count:
-    """A counted line of the table: how often `met` among the outcomes that `among` lets in, and the target."""
+    """A counted line of the table: how often `met` among the outcomes that `among` lets in, and the target, at `least` or at
+    `most`."""
 
     title: str
     prefix: str
@@ -45,12 +46,10 @@ class Count:
         if count == 0 or (self.least is None and self.most is None):
             return None
         share = hits / count
-        return share >= (self.least or 0.0) and share <= (1.0 if self.most is None else self.most)
+        return share <= self.most if self.least is None else share >= self.least
 
     @property
     def target(self) -> str:
-        if self.least is not None and self.most is not None:
-            return f"{100 * self.least:g} to {100 * self.most:g} %"
         if self.least is not None:
             return f"≥ {100 * self.least:g} %"
         return f"≤ {100 * self.most:g} %" if self.most is not None else ""

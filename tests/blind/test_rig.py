@@ -212,14 +212,33 @@ def test_what_cannot_be_loud_says_so() -> None:
         ear.amplitude_for(whisper, 50.0)
 
 
+def test_an_effect_acts_at_its_own_sites_alone() -> None:
+    hidden = hide((5, 4), states=4)
+    base, rng = read(hidden.plan, hidden.clutch), np.random.default_rng(1)
+    for slug, (make, _) in ALL.items():
+        effect = make(rng, hidden.plan)
+        changed = read(hidden.plan, hidden.clutch, [(effect, effect.unit)])
+        where = {
+            site.kind for site, a, b in zip(hidden.plan.sites, changed, base, strict=True) if not np.array_equal(a, b)
+        }
+        assert where <= set(effect.at), slug
+        if slug in {"channel_delay", "squeeze_film", "shaft_ripple", "braking", "unsettled_dwell", "clock_wobble"}:
+            assert where == set(effect.at) - {"raw"}, slug
+
+
 def test_the_campaign_holds_what_the_runs_say() -> None:
-    hidden = hide((5, 4), ("load_severity",), 20.0)
+    hidden = hide((5, 4), ("load_severity",), 20.0, oil=True)
     sent, seen = runs(hidden), campaign(hidden)
     first = next(run for run in sent if run["kind"] == "stationary_stribeck")
     np.testing.assert_allclose(seen.stationary[0].plateaus.pressure, 1e5 * np.array(first["channels"]["pressure_bar"]))
     np.testing.assert_allclose(
         seen.stationary[0].plateaus.speed * RADIUS, np.array(first["channels"]["speed_rpm"]) * RPM * RADIUS
     )
+    oil = np.array(first["channels"]["oil_temperature_c"])
+    np.testing.assert_allclose(seen.stationary[0].plateaus.oil_temperature, 273.15 + oil)
+    assert not hide(
+        (5, 4), ("oil_temperature",), 20.0, oil=False, loops=False
+    ).plan.tells_oil  # what is wanted comes first
     assert [run.cycles for run in seen.stationary] == sorted(run.cycles for run in seen.stationary)
     assert len(seen.duty) == len(seen.stationary) - 1
     assert all(block.energy is not None and block.energy > 1e3 for block in seen.duty)

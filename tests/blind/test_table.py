@@ -42,9 +42,9 @@ def test_one_who_knows_meets_every_target_and_one_misled_does_not() -> None:
     # every line of the table has its trials, every effect its rows, and no two campaigns are alike
     assert all(line.of(outcomes)[1] > 0 for line in counts() if "ambiguous" not in line.title)
     lines = blind.document(outcomes, "make blind")
-    assert all(f"| `{slug}` | 4 | 4/4 |" in "\n".join(lines) for slug in CATALOGUED)
+    assert all(f"| `{slug}` | 4 | 4/4 | 4/4 | 4/4 | 4/4 | 0/4 | 0/4 |" in "\n".join(lines) for slug in CATALOGUED)
     assert all(f"| `{slug}` | 2, 0 of 2 | 2, 0 of 2 |" in "\n".join(lines) for slug in CATALOGUED)
-    assert all(f"| {slug.replace('_', ' ')} | 2 | 2 | 2 |" in "\n".join(lines) for slug in OUTSIDE)
+    assert all(f"| {slug.replace('_', ' ')} | 2 | 2 | 2 | 2 | 0 |" in "\n".join(lines) for slug in OUTSIDE)
     assert len({trial.seed for trial in made}) == len(made)
     assert {trial.seed for trial in made}.isdisjoint(trial.seed for trial in trials(2, 0.1))
 

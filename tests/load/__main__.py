@@ -11,6 +11,7 @@ import asyncio
 import gc
 import os
 import platform
+import resource
 import sqlite3
 import sys
 import tempfile
@@ -24,15 +25,14 @@ import httpx2
 from models.rig.programme import WHOLE
 from service.client.clutchlife import ClutchlifeError
 from tests.benchmarks.diagnosis import post_life
-from tests.load import beside, checks
+from tests.benchmarks.memory import busy_seconds, family_seconds
+from tests.load import checks
 from tests.load.bodies import Post, life
-from tests.load.field import Counts, Field, Options
+from tests.load.field import DIAGNOSED, Counts, Field, Options
 from tests.load.report import demands, markdown, paces
 from tests.storage.engine.postgresql.server import postgresql_server
 from tests.support import Server, serving
 
-#: The clutch that is diagnosed all the time.
-DIAGNOSED = "diagnosed"
 #: In place of an address: a server that is started for the load, whose commits are on the disk.
 TEMPORARY = "postgresql"
 #: Clutches of a fleet whose remaining life a replay must not change.
@@ -53,9 +53,9 @@ def run(options: Options, folder: Path) -> Counts:
             post_life(http, DIAGNOSED, options.states, WHOLE)
         gc.collect()
         gc.freeze()  # the prepared bodies are not looked through by the collector: it would delay what is sent meanwhile
-        before = beside.worked(pids)
+        before = _worked(pids)
         field = asyncio.run(_loaded(options, servers, lives))
-        field.counts.worked = {who: seconds - before[who] for who, seconds in beside.worked(pids).items()}
+        field.counts.worked = {who: seconds - before[who] for who, seconds in _worked(pids).items()}
         gc.unfreeze()
         field.counts.losses = _wrong(field, servers[0], folder)
     return field.counts
@@ -63,16 +63,22 @@ def run(options: Options, folder: Path) -> Counts:
 
 async def _loaded(options: Options, servers: Sequence[Server], lives: Sequence[Sequence[Post]]) -> Field:
     begin = asyncio.get_running_loop().time() + 0.5
-    end = begin + options.seconds
-    field = Field(options=options, ports=[server.port for server in servers], lives=lives, begin=begin, end=end)
-    await asyncio.gather(
-        *field.tasks(),
-        beside.diagnose(servers[-1].port, DIAGNOSED, end, field.counts),
-        beside.refresh_fleets(servers[0].address, begin, end, field.counts),
-        beside.watch([server.pid for server in servers], begin, end, field.counts),
-    )
-    await beside.refresh_once(servers[0].address, field.counts)  # all clutches under what is known at the end
+    field = Field(options=options, servers=servers, lives=lives, begin=begin, end=begin + options.seconds)
+    await asyncio.gather(*field.tasks())
+    await field.refresh_once()  # all clutches under what is known at the end
     return field
+
+
+def _worked(pids: Sequence[int]) -> dict[str, float]:
+    """Seconds of the processor that the services with their processes, the generator, the refreshes, and everything else on
+    the machine have taken since each began; only differences mean anything."""
+    own, children = (resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+    taken = {
+        "service": sum(map(family_seconds, pids)),
+        "generator": own.ru_utime + own.ru_stime,
+        "refreshes": children.ru_utime + children.ru_stime,
+    }
+    return taken | {"others": busy_seconds() - sum(taken.values())}
 
 
 def _wrong(field: Field, server: Server, folder: Path) -> list[str]:

@@ -1,5 +1,7 @@
 """The test field: rigs that post life after life, clients that ask once a second, and what is counted of them.
 
+Beside them a clutch is diagnosed again and again, fleets are refreshed, and memory is watched.
+
 A rig begins at a moment of its own, and sends its next run when the last one's receipt has come (closed loop). A client's
 questions are planned by the clock (open loop): each is measured from the moment at which it was to be sent, whether or not
 its connection was free by then, so that a service that stands for a second is charged for all that would have been asked in
@@ -9,13 +11,16 @@ it.
 import asyncio
 import itertools
 import random
+import sys
 from collections import Counter, defaultdict
 from collections.abc import AsyncIterator, Awaitable, Sequence
 from dataclasses import dataclass, field
 
 from httpx2 import AsyncClient, Limits, Response, TimeoutException, TransportError
 
-from tests.load.bodies import SAMPLES, TESTS, Post, Request, registration
+from tests.benchmarks.memory import family, resident
+from tests.load.bodies import SAMPLES, TESTS, Post, Request, posted, registration
+from tests.support import Server
 
 #: What a client asks in each second, a quarter of a second apart.
 ROUTES = ("remaining-useful-life", "degradation", "clutches", "runs")
@@ -26,6 +31,10 @@ LIVEZ_EVERY = 0.1
 GRACE = 5.0
 #: Seconds that a rig waits after an error where the answer names none, before it sends the same run again.
 _PAUSE = 1.0
+#: The clutch that is diagnosed all the time.
+DIAGNOSED = "diagnosed"
+#: Seconds between two looks at a diagnosis, between two refreshes, and between two looks at the memory.
+LOOK_EVERY, REFRESH_EVERY, WATCH_EVERY = 0.5, 20.0, 1.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -108,11 +117,11 @@ class Counts:
 
 @dataclass(slots=True)
 class Field:
-    """The field on the ports of the services that share a database, over which rigs and clients are spread, from `begin` to
-    `end` by the clock of the event loop."""
+    """The field on the services that share a database, over which rigs and clients are spread, from `begin` to `end` by the
+    clock of the event loop."""
 
     options: Options
-    ports: Sequence[int]
+    servers: Sequence[Server]
     lives: Sequence[Sequence[Post]]
     begin: float
     end: float
@@ -131,17 +140,35 @@ class Field:
         for number in range(self.options.clients):
             phase = rng.random()
             tasks += [self._client(number, phase, part) for part in range(len(ROUTES))]
-        return [*tasks, self._livez()]
+        return [*tasks, self._livez(), self._diagnose(), self._refresh_fleets(), self._watch()]
 
-    def _port(self, number: int) -> int:
-        return self.ports[number % len(self.ports)]
+    def _line(self, number: int) -> AsyncClient:
+        """A connection of one's own, closed before the service would close it, whose answers are not packed."""
+        url = self.servers[number % len(self.servers)].url
+        headers, limits = {"Accept-Encoding": "identity"}, Limits(max_connections=1, keepalive_expiry=2.0)
+        return AsyncClient(base_url=url, timeout=60, headers=headers, limits=limits, verify=False)
+
+    async def _noted(self, http: AsyncClient, request: Request, what: str) -> Response | None:
+        """An answer; counts what was not 2xx or 304, by status and its first words. None where no answer came."""
+        problems = self.counts.problems
+        try:
+            answer = await http.request(**request)
+        except TimeoutException:
+            problems[f"{what}: no answer in time"] += 1
+        except TransportError as error:
+            problems[f"{what}: connection lost ({error})"] += 1
+        else:
+            if not (answer.is_success or answer.status_code == 304):
+                problems[f"{what}: {answer.status_code} {answer.text[:120]}"] += 1
+            return answer
+        return None
 
     # --- rigs ---
 
     async def _rig(self, number: int, phase: float) -> None:
         loop = asyncio.get_running_loop()
-        async with line(self._port(number)) as http:
-            await until(self.begin + phase * self.options.interval)  # rigs know nothing of each other
+        async with self._line(number) as http:
+            await _until(self.begin + phase * self.options.interval)  # rigs know nothing of each other
             for turn in itertools.count():
                 clutch_id = f"load-{number}-{turn:03d}"
                 if await self._sent(http, registration(clutch_id, self.fluid(number, turn)), "registration") is None:
@@ -153,8 +180,13 @@ class Field:
                     if answer is None:
                         self.counts.unanswered.add((clutch_id, post.run_id))
                         return
-                    self._acknowledge(clutch_id, post, answer)
-                    await until(started + self.options.interval)
+                    receipt = answer.json()
+                    self.counts.acknowledged[clutch_id].append(
+                        Acknowledged(post=post, sha256=receipt["content_sha256"])
+                    )
+                    self.counts.held += receipt.get("state") == "held"
+                    self.counts.kinds["raw file" if post.raw else post.kind] += 1
+                    await _until(started + self.options.interval)
 
     def fluid(self, number: int, turn: int) -> str:
         """The fluid of that clutch: the last rigs' clutches have each their own."""
@@ -165,19 +197,13 @@ class Field:
         loop = asyncio.get_running_loop()
         while loop.time() < self.end:
             started = loop.time()
-            answer = await noted(http, request, f"POST {what}", self.counts.problems)
+            answer = await self._noted(http, request, f"POST {what}")
             self.counts.posts[what].append(loop.time() - started)
             if answer is not None and answer.is_success:
                 return answer
             pause = _PAUSE if answer is None else float(answer.headers.get("retry-after") or _PAUSE)
             await asyncio.sleep(pause)
         return None
-
-    def _acknowledge(self, clutch_id: str, post: Post, answer: Response) -> None:
-        receipt = answer.json()
-        self.counts.acknowledged[clutch_id].append(Acknowledged(post=post, sha256=receipt["content_sha256"]))
-        self.counts.held += receipt.get("state") == "held"
-        self.counts.kinds["raw file" if post.raw else post.kind] += 1
 
     # --- clients ---
 
@@ -187,7 +213,7 @@ class Field:
         A dashboard names the answer that it has, a script does not.
         """
         tags, route, dashboard = dict[str, str](), ROUTES[part], number % 2 == 0
-        async with line(self._port(number + part)) as http:
+        async with self._line(number + part) as http:
             async for tick, planned in self._planned(route, phase + part / len(ROUTES), 1.0):
                 clutch_id = self.on_rigs[(number + tick) % self.options.rigs]
                 if clutch_id is None:
@@ -199,7 +225,7 @@ class Field:
                     tags[address] = answer.headers["etag"]
 
     async def _livez(self) -> None:
-        async with line(self._port(0)) as http:
+        async with self._line(0) as http:
             async for _, planned in self._planned(LIVEZ, 0.0, LIVEZ_EVERY):
                 await self._timed(http, "/livez", LIVEZ, planned, {})
 
@@ -212,7 +238,7 @@ class Field:
             if planned >= self.end:
                 return
             if planned > loop.time():
-                await until(planned)
+                await _until(planned)
                 self.counts.late = max(self.counts.late, loop.time() - planned)
             if loop.time() < self.end + GRACE:
                 yield number, planned
@@ -224,34 +250,69 @@ class Field:
         self, http: AsyncClient, address: str, route: str, planned: float, headers: dict[str, str]
     ) -> Response | None:
         request = {"method": "GET", "url": address, "headers": headers}
-        answer = await noted(http, request, f"GET {route}", self.counts.problems)
+        answer = await self._noted(http, request, f"GET {route}")
         self.counts.gets[route].append(asyncio.get_running_loop().time() - planned)
         if answer is not None:
             self.counts.statuses[route, answer.status_code] += 1
         return answer
 
+    # --- beside them ---
 
-def line(port: int) -> AsyncClient:
-    """A connection of one's own, closed before the service would close it, whose answers are not packed."""
-    headers, limits = {"Accept-Encoding": "identity"}, Limits(max_connections=1, keepalive_expiry=2.0)
-    return AsyncClient(base_url=f"http://127.0.0.1:{port}", timeout=60, headers=headers, limits=limits, verify=False)
+    async def _diagnose(self) -> None:
+        """Have a clutch diagnosed, again and again."""
+        loop = asyncio.get_running_loop()
+        async with self._line(-1) as http:
+            question = posted(f"/v1/clutches/{DIAGNOSED}/diagnoses", b"{}", Prefer="wait=0")
+            while loop.time() < self.end:
+                started = loop.time()
+                answer = await self._noted(http, question, "POST diagnoses")
+                if answer is None or answer.status_code not in (201, 202):
+                    await asyncio.sleep(LOOK_EVERY)
+                    continue
+                report = answer.json()
+                look = {"method": "GET", "url": answer.headers["location"]}
+                while report["status"] == "running" and loop.time() < self.end:
+                    await asyncio.sleep(LOOK_EVERY)
+                    answer = await self._noted(http, look, "GET diagnoses")
+                    if answer is not None and answer.status_code == 200:
+                        report = answer.json()
+                if report["status"] == "finished":
+                    self.counts.diagnoses.append(loop.time() - started)
+                elif report["status"] == "failed":
+                    reason = report.get("problem") or report.get("summary")
+                    self.counts.problems[f"diagnosis failed: {reason}"] += 1
+
+    async def _refresh_fleets(self) -> None:
+        """Refresh the fleets every so many seconds, in a process of its own."""
+        planned = self.begin + REFRESH_EVERY / 2
+        while planned < self.end:
+            await _until(planned)
+            await self.refresh_once()
+            planned = max(planned + REFRESH_EVERY, asyncio.get_running_loop().time())
+
+    async def refresh_once(self) -> None:
+        """The command that learns the fleets' priors again, waited for."""
+        loop = asyncio.get_running_loop()
+        started, address = loop.time(), self.servers[0].address
+        command = [sys.executable, "-m", "service.cli.main", "fleet", "refresh", "--database", address]
+        pipe = asyncio.subprocess.PIPE
+        process = await asyncio.create_subprocess_exec(*command, stdout=pipe, stderr=pipe)
+        _, errors = await process.communicate()
+        self.counts.refreshes.append(loop.time() - started)
+        if process.returncode != 0:
+            said = errors[-160:].decode(errors="replace")
+            self.counts.problems[f"fleet refresh ended with {process.returncode}: {said}"] += 1
+
+    async def _watch(self) -> None:
+        """Resident memory of the services, alone and with their processes, once a second."""
+        planned, pids = self.begin, [server.pid for server in self.servers]
+        while planned < self.end:
+            await _until(planned)
+            self.counts.alone.append(sum(map(resident, pids)))
+            self.counts.together.append(sum(resident(each) for pid in pids for each in family(pid)))
+            planned += WATCH_EVERY
 
 
-async def noted(http: AsyncClient, request: Request, what: str, problems: Counter[str]) -> Response | None:
-    """An answer; counts what was not 2xx or 304, by status and its first words. None where no answer came."""
-    try:
-        answer = await http.request(**request)
-    except TimeoutException:
-        problems[f"{what}: no answer in time"] += 1
-    except TransportError as error:
-        problems[f"{what}: connection lost ({error})"] += 1
-    else:
-        if not (answer.is_success or answer.status_code == 304):
-            problems[f"{what}: {answer.status_code} {answer.text[:120]}"] += 1
-        return answer
-    return None
-
-
-async def until(moment: float) -> None:
+async def _until(moment: float) -> None:
     """Sleep until a moment of the loop's clock; where it is over, others have their turn."""
     await asyncio.sleep(max(0.0, moment - asyncio.get_running_loop().time()))

@@ -21,10 +21,9 @@ from models.diagnosis.report.isolability import visible_of
 from tests.blind.rig.clutch import Law
 from tests.blind.rig.hide import Hidden, hide
 from tests.blind.rig.makers import CATALOGUED
-from tests.blind.rig.plan import RPM, Life, Site
+from tests.blind.rig.plan import DWELL, RPM, Life, Site
 from tests.blind.rig.sensor import measure
 from tests.blind.rig.sent import campaign
-from tests.blind.rig.steady import DWELL
 from tests.blind.rig.world import Effect, read
 from tests.blind.rows import LOOPS, RECORDS
 

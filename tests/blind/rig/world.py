@@ -12,8 +12,6 @@ from tests.blind.rig.plan import Plan, Site
 Friction = Callable[[float, Site, Law], FloatArray]
 Reading = Callable[[float, Site, FloatArray], FloatArray]
 Drag = Callable[[FloatArray], FloatArray]
-#: Kinds of sites that are stationary tests: averaged on the rig, or recorded.
-TESTS = ("stationary", "raw")
 
 
 @dataclass(frozen=True)
@@ -29,7 +27,7 @@ class Effect:
     most: float
     friction: Friction | None = None
     reading: Reading | None = None
-    at: tuple[str, ...] = (*TESTS, "loop")
+    at: tuple[str, ...] = ("stationary", "raw", "loop")
     axes: frozenset[str] = frozenset()
     fast: bool = False  # swings from sample to sample, so that no mean over samples shows it
     moves_life: bool = False
