@@ -10,6 +10,7 @@ import zipfile
 from collections.abc import Callable
 from datetime import datetime, timedelta
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -53,6 +54,11 @@ def rows(separator: str = ",", decimal: str = ".", names: list[str] | None = Non
     return "\n".join(lines) + "\n"
 
 
+def each(line: Callable[[float, float, float, float], str]) -> str:
+    """A line for each row of the record."""
+    return "".join(line(*row) + "\n" for row in zip(*RECORD.values(), strict=True))
+
+
 def frame() -> pd.DataFrame:
     return pd.DataFrame(RECORD)
 
@@ -92,202 +98,197 @@ def long(titles: str, form: str) -> str:
 
 HEAD = ",".join(RECORD)
 GERMAN = ";".join(NAMES.values())
-MAPPED = "time_s:Zeit,pressure_bar:p1,speed_rpm:n1,torque_nm:Mz"
-#: Name of the file -> its text, and a map where it needs one.
-TEXTS: dict[str, tuple[str | bytes, str | None]] = {
-    "pandas.csv": (frame().to_csv(), None),
-    "pandas-semicolon.csv": (frame().to_csv(sep=";", decimal=",", index=False), None),
-    "pandas-tabs.txt": (frame().to_csv(sep="\t", index=False), None),
-    "pandas-string.txt": (frame().to_string(index=False), None),
-    "pandas-dates.csv": (stamps("%Y-%m-%d %H:%M:%S.%f"), None),
-    "iso.csv": (stamps("%Y-%m-%dT%H:%M:%S.%f"), None),
-    "zone.csv": (stamps("%Y-%m-%dT%H:%M:%S.%f+01:00"), None),
-    "german-dates.csv": (stamps("%d.%m.%Y %H:%M:%S.%f"), None),
-    "american-dates.csv": (stamps("%m/%d/%Y %I:%M:%S.%f %p"), None),
-    "matlab-dates.csv": (stamps("%d-%b-%Y %H:%M:%S.%f"), None),
-    "times-of-day.csv": (stamps("%H:%M:%S.%f"), None),
-    "timedelta.csv": (frame().assign(time_s=lambda f: pd.to_timedelta(f.time_s, unit="s").astype(str)).to_csv(), None),
-    "savetxt.txt": (savetxt(header=" ".join(RECORD)), None),
-    "savetxt-commas.csv": (savetxt(delimiter=",", header=HEAD, comments=""), None),
-    "savetxt-g.csv": (savetxt(fmt="%g", delimiter=";", header=HEAD.replace(",", ";")), None),
-    "fixed-width.txt": ("  ".join(f"{name:>14}" for name in RECORD) + "\n" + rows("        "), None),
-    "units-in-brackets-and-blanks.txt": ("t [s]  p [bar]  n [rpm]  M [Nm]\n" + rows("   "), None),
-    "bars.txt": (HEAD.replace(",", "|") + "\n" + rows("|"), None),
-    "latin.csv": ((GERMAN.replace("M [Nm]", "Drehmoment [N·m]") + "\n" + rows(";", ",")).encode("cp1252"), None),
-    "utf16.txt": ((GERMAN.replace(";", "\t") + "\n" + rows("\t", ",")).encode("utf-16"), None),
-    "utf8-bom.csv": ((GERMAN + "\n" + rows(";", ",")).encode("utf-8-sig"), None),
-    "gbk.csv": (("时间(s),压力(bar),转速(rpm),扭矩(Nm)\n" + rows()).encode("gbk"), None),
-    "sjis.csv": (("時間 (s),圧力 (bar),回転数 (rpm),トルク (Nm)\n" + rows()).encode("shift_jis"),
-                 "time_s:時間 (s),pressure_bar:圧力 (bar),speed_rpm:回転数 (rpm),torque_nm:トルク (Nm)"),
-    "cyrillic.csv": (("время [s];давление [bar];обороты [rpm];момент [Nm]\n" + rows(";", ",")).encode("cp1251"),
-                     "time_s:время,pressure_bar:давление,speed_rpm:обороты,torque_nm:момент"),
-    "unit-row.csv": ("Zeit;Druck;Drehzahl;Drehmoment\ns;bar;1/min;Nm\n" + rows(";", ","), None),
-    "unit-row-brackets.csv": ("Zeit;Druck;Drehzahl;Drehmoment\n[s];[bar];[1/min];[Nm]\n" + rows(";", ","), None),
-    "unit-row-above.csv": ("s;bar;1/min;Nm\nZeit;Druck;Drehzahl;Drehmoment\n" + rows(";", ","), None),
-    "header-block.csv": ("Prüfstand 3\nPrüfer;Meier\nDatum;2.11.26\nLasten;7000\n\n" + GERMAN + "\n" + rows(";", ","), None),
-    "colons-above.txt": ("Operator: Meier\nGain: 2.0\nSamples: 12\n\n" + HEAD.replace(",", "\t") + "\n" + rows("\t"), None),
-    "numbers-above.csv": ("Offset,1,2,3\nGain,1,1,1\nend of header\n" + HEAD + "\n" + rows(), None),
-    "two-rows-of-titles.csv": (",Kupplung,,\nZeit,Druck,Drehzahl,Moment\ns,bar,rpm,Nm\n" + rows(), None),
-    "repeated-titles.csv": (HEAD + "\n" + rows().replace("0.0500,", HEAD + "\n0.0500,"), None),
-    "remarks.csv": (HEAD + ",Bemerkung\n" + rows().replace("\n", ",läuft gut; ja\n"), None),
-    "remarks-quoted.csv": (HEAD + ",Bemerkung\n" + rows().replace("\n", ',"ein, zwei\nund drei"\n'), None),
-    "comma-units.csv": ("Time, s;Pressure, bar;Speed, rpm;Torque, Nm\n" + rows(";"), None),
-    "slash-units.csv": ("t / s;p / bar;n / 1/min;M / Nm\n" + rows(";", ","), None),
-    "in-units.csv": ("Zeit in s;Druck in bar;Drehzahl in 1/min;Moment in Nm\n" + rows(";", ","), None),
-    "wide-brackets.csv": ("t（s）,p［bar］,n（rpm）,M（Nm）\n" + rows(), None),
-    "line-break-in-title.csv": ('"Zeit\n[s]";"Druck\n[bar]";"Drehzahl\n[1/min]";"Md\n[Nm]"\n' + rows(";", ","), None),
-    "all-quoted.csv": ('"' + HEAD.replace(",", '","') + '"\n' + '"' + rows('","').replace("\n", '"\n"')[:-1], None),
-    "trailing.csv": (HEAD + ",,\n" + rows().replace("\n", ",,\n"), None),
-    "mapped.csv": ("Zeit;p1;n1;Mz;x\n" + rows(";", ",").replace("\n", ";7\n"), MAPPED),
-    "thousands-german.csv": (GERMAN + "\n" + grouped(".", ","), None),
-    "thousands-american.csv": (HEAD + "\n" + grouped(",", ".", '"'), None),
-    "thousands-swiss.csv": (GERMAN + "\n" + grouped("'", "."), None),
-    "signs.csv": (HEAD + "\n" + rows().replace("\n", "\n+")[:-1].replace("0.0", ".0", 1), None),
-    "exponents.csv": (HEAD + "\n" + rows(number="%.12E"), None),
-    "old-mac.csv": ((HEAD + "\n" + rows()).replace("\n", "\r"), None),
-    "sep.csv": ("sep=;\n" + GERMAN + "\n" + rows(";", ","), None),
+#: Name of the file -> its text.
+TEXTS: dict[str, str | bytes] = {
+    "pandas.csv": frame().to_csv(),
+    "pandas-semicolon.csv": frame().to_csv(sep=";", decimal=",", index=False),
+    "pandas-tabs.txt": frame().to_csv(sep="\t", index=False),
+    "pandas-string.txt": frame().to_string(index=False),
+    "pandas-dates.csv": stamps("%Y-%m-%d %H:%M:%S.%f"),
+    "iso.csv": stamps("%Y-%m-%dT%H:%M:%S.%f"),
+    "zone.csv": stamps("%Y-%m-%dT%H:%M:%S.%f+01:00"),
+    "german-dates.csv": stamps("%d.%m.%Y %H:%M:%S.%f"),
+    "american-dates.csv": stamps("%m/%d/%Y %I:%M:%S.%f %p"),
+    "matlab-dates.csv": stamps("%d-%b-%Y %H:%M:%S.%f"),
+    "times-of-day.csv": stamps("%H:%M:%S.%f"),
+    "timedelta.csv": frame().assign(time_s=lambda f: pd.to_timedelta(f.time_s, unit="s").astype(str)).to_csv(),
+    "savetxt.txt": savetxt(header=" ".join(RECORD)),
+    "savetxt-commas.csv": savetxt(delimiter=",", header=HEAD, comments=""),
+    "savetxt-g.csv": savetxt(fmt="%g", delimiter=";", header=HEAD.replace(",", ";")),
+    "fixed-width.txt": "  ".join(f"{name:>14}" for name in RECORD) + "\n" + rows("        "),
+    "units-in-brackets-and-blanks.txt": "t [s]  p [bar]  n [rpm]  M [Nm]\n" + rows("   "),
+    "bars.txt": HEAD.replace(",", "|") + "\n" + rows("|"),
+    "latin.csv": (GERMAN.replace("M [Nm]", "Drehmoment [N·m]") + "\n" + rows(";", ",")).encode("cp1252"),
+    "utf16.txt": (GERMAN.replace(";", "\t") + "\n" + rows("\t", ",")).encode("utf-16"),
+    "utf8-bom.csv": (GERMAN + "\n" + rows(";", ",")).encode("utf-8-sig"),
+    "gbk.csv": ("时间(s),压力(bar),转速(rpm),扭矩(Nm)\n" + rows()).encode("gbk"),
+    "sjis.csv": ("時間 (s),圧力 (bar),回転数 (rpm),トルク (Nm)\n" + rows()).encode("shift_jis"),
+    "cyrillic.csv": ("время [s];давление [bar];обороты [rpm];момент [Nm]\n" + rows(";", ",")).encode("cp1251"),
+    "unit-row.csv": "Zeit;Druck;Drehzahl;Drehmoment\ns;bar;1/min;Nm\n" + rows(";", ","),
+    "unit-row-brackets.csv": "Zeit;Druck;Drehzahl;Drehmoment\n[s];[bar];[1/min];[Nm]\n" + rows(";", ","),
+    "unit-row-above.csv": "s;bar;1/min;Nm\nZeit;Druck;Drehzahl;Drehmoment\n" + rows(";", ","),
+    "header-block.csv": "Prüfstand 3\nPrüfer;Meier\nDatum;2.11.26\nLasten;7000\n\n" + GERMAN + "\n" + rows(";", ","),
+    "colons-above.txt": "Operator: Meier\nGain: 2.0\nSamples: 12\n\n" + HEAD.replace(",", "\t") + "\n" + rows("\t"),
+    "numbers-above.csv": "Offset,1,2,3\nGain,1,1,1\nend of header\n" + HEAD + "\n" + rows(),
+    "two-rows-of-titles.csv": ",Kupplung,,\nZeit,Druck,Drehzahl,Moment\ns,bar,rpm,Nm\n" + rows(),
+    "repeated-titles.csv": HEAD + "\n" + rows().replace("0.0500,", HEAD + "\n0.0500,"),
+    "remarks.csv": HEAD + ",Bemerkung\n" + rows().replace("\n", ",läuft gut; ja\n"),
+    "remarks-quoted.csv": HEAD + ",Bemerkung\n" + rows().replace("\n", ',"ein, zwei\nund drei"\n'),
+    "comma-units.csv": "Time, s;Pressure, bar;Speed, rpm;Torque, Nm\n" + rows(";"),
+    "slash-units.csv": "t / s;p / bar;n / 1/min;M / Nm\n" + rows(";", ","),
+    "in-units.csv": "Zeit in s;Druck in bar;Drehzahl in 1/min;Moment in Nm\n" + rows(";", ","),
+    "wide-brackets.csv": "t（s）,p［bar］,n（rpm）,M（Nm）\n" + rows(),
+    "line-break-in-title.csv": '"Zeit\n[s]";"Druck\n[bar]";"Drehzahl\n[1/min]";"Md\n[Nm]"\n' + rows(";", ","),
+    "all-quoted.csv": '"' + HEAD.replace(",", '","') + '"\n' + '"' + rows('","').replace("\n", '"\n"')[:-1],
+    "trailing.csv": HEAD + ",,\n" + rows().replace("\n", ",,\n"),
+    "mapped.csv": "Zeit;p1;n1;Mz;x\n" + rows(";", ",").replace("\n", ";7\n"),
+    "thousands-german.csv": GERMAN + "\n" + grouped(".", ","),
+    "thousands-american.csv": HEAD + "\n" + grouped(",", ".", '"'),
+    "thousands-swiss.csv": GERMAN + "\n" + grouped("'", "."),
+    "signs.csv": HEAD + "\n" + rows().replace("\n", "\n+")[:-1].replace("0.0", ".0", 1),
+    "exponents.csv": HEAD + "\n" + rows(number="%.12E"),
+    "old-mac.csv": (HEAD + "\n" + rows()).replace("\n", "\r"),
+    "sep.csv": "sep=;\n" + GERMAN + "\n" + rows(";", ","),
     "labview.lvm": ("LabVIEW Measurement\t\nDecimal_Separator\t,\nX_Columns\tOne\nTime\t08:00\n***End_of_Header***\t\n\t\n"
                     "Channels\t3\t\t\t\nY_Unit_Label\tbar\trpm\tNm\t\nX0\t0,0\t0,0\t0,0\t\nDelta_X\t0,01\t0,01\t0,01\t\n"
-                    "***End_of_Header***\t\t\t\t\nX_Value\tDruck\tDrehzahl\tMoment\tComment\n" + rows("\t", ","), None),
+                    "***End_of_Header***\t\t\t\t\nX_Value\tDruck\tDrehzahl\tMoment\tComment\n" + rows("\t", ",")),
     "labview-without-times.lvm": ("LabVIEW Measurement\t\nX_Columns\tNo\n***End_of_Header***\t\n\t\nChannels\t3\n"
                                   "Y_Unit_Label\tbar\trpm\tNm\nX0\t0.0\t0.0\t0.0\nDelta_X\t0.01\t0.01\t0.01\n"
                                   "***End_of_Header***\nX_Value\tDruck\tDrehzahl\tMoment\tComment\n\t"
-                                  + rows("\t", names=PLATEAUS).replace("\n", "\n\t")[:-1], None),
+                                  + rows("\t", names=PLATEAUS).replace("\n", "\n\t")[:-1]),
     "diadem.csv": ("TITLE;x\n"
                    "ChannelName;Zeit;Druck;Drehzahl;Moment\nUnit;s;bar;1/min;Nm\nLength;12;12;12;12\nMaximum;1;5;1970;21\n"
-                   ";" + rows(";", ",").replace("\n", "\n;")[:-1], None),
+                   ";" + rows(";", ",").replace("\n", "\n;")[:-1]),
     "dewesoft.csv": ("Start time:,2026/11/02 08:00\nSample rate:,100\n\n"
-                     "Time (s),p/AVE (bar),n/AVE (rpm),M/AVE (Nm)\n" + rows(),
-                     "time_s:Time,pressure_bar:p/AVE,speed_rpm:n/AVE,torque_nm:M/AVE"),
-    "viewer.csv": ('"timestamps","p [bar]","n [rpm]","M [Nm]"\n' + rows(), None),
-    "french.csv": (("Temps (s);Pression (bar);Vitesse (tr/min);Couple (N.m)\n" + rows(";", ",")).encode("cp1252"), None),
-    "spanish.csv": (("Tiempo;Presión;Velocidad;Par\ns;bar;rpm;N·m\n" + rows(";", ",")).encode("cp1252"), None),
-    "japanese.csv": (("時間[s],圧力[bar],回転数[min-1],トルク[N・m]\n" + rows()).encode("shift_jis"), None),
-    "japanese-euc.csv": (("時間[s],圧力[bar],回転数[rpm],トルク[Nm]\n" + rows()).encode("euc_jp"), None),
-    "japanese-wide.csv": ("時刻 [ｓ],圧力 [ｂａｒ],回転数 [ｒｐｍ],トルク [Ｎｍ]\n" + rows(), None),
-    "chinese-slash.csv": ("时间/s,压力/bar,转速/(r/min),扭矩/(N·m)\n" + rows(), None),
-    "chinese-units.csv": (("时间（秒）,油压（巴）,转速（转/分）,转矩（牛·米）\n" + rows()).encode("gbk"), None),
-    "taiwanese.csv": (("時間(s),壓力(bar),轉速(rpm),扭矩(N-m)\n" + rows()).encode("big5"), None),
-    "capitals.csv": ("TIME (SEC),PRESSURE (BAR),SPEED (RPM),TORQUE (N-M)\n" + rows(), None),
-    "past-midnight.csv": (stamps("%H:%M:%S.%f", datetime(2026, 11, 2, 23, 59, 59, 950_000)), None),
-    "zone-without-colon.csv": (stamps("%Y-%m-%dT%H:%M:%S.%f+0100"), None),
-    "chinese-dates.csv": (stamps("%Y年%m月%d日 %H:%M:%S.%f"), None),
-    "thousands-french.csv": (GERMAN + "\n" + grouped("\u202f", ","), None),
-    "thousands-blanks.csv": (GERMAN + "\n" + grouped(" ", ","), None),
-    "means-below.csv": (HEAD + "\n" + rows() + "\nMean,5,1000,20\nMax,5,1970,21\n", None),
-    "means-below-numbers.csv": ("Nr," + HEAD + "\n1," + rows().replace("\n", "\n1,")[:-2] + "Mean,5,5,1000,20\n", None),
-    "words-below.csv": (GERMAN + "\n" + rows(";", ",") + "Ende der Messung\nPrüfer: Meier\n", None),
-    "minus.csv": (HEAD + "\n" + rows().replace("0.0000,", "−0.0000,", 1), None),
+                     "Time (s),p/AVE (bar),n/AVE (rpm),M/AVE (Nm)\n" + rows()),
+    "viewer.csv": '"timestamps","p [bar]","n [rpm]","M [Nm]"\n' + rows(),
+    "french.csv": ("Temps (s);Pression (bar);Vitesse (tr/min);Couple (N.m)\n" + rows(";", ",")).encode("cp1252"),
+    "spanish.csv": ("Tiempo;Presión;Velocidad;Par\ns;bar;rpm;N·m\n" + rows(";", ",")).encode("cp1252"),
+    "japanese.csv": ("時間[s],圧力[bar],回転数[min-1],トルク[N・m]\n" + rows()).encode("shift_jis"),
+    "japanese-euc.csv": ("時間[s],圧力[bar],回転数[rpm],トルク[Nm]\n" + rows()).encode("euc_jp"),
+    "japanese-wide.csv": "時刻 [ｓ],圧力 [ｂａｒ],回転数 [ｒｐｍ],トルク [Ｎｍ]\n" + rows(),
+    "chinese-slash.csv": "时间/s,压力/bar,转速/(r/min),扭矩/(N·m)\n" + rows(),
+    "chinese-units.csv": ("时间（秒）,油压（巴）,转速（转/分）,转矩（牛·米）\n" + rows()).encode("gbk"),
+    "taiwanese.csv": ("時間(s),壓力(bar),轉速(rpm),扭矩(N-m)\n" + rows()).encode("big5"),
+    "capitals.csv": "TIME (SEC),PRESSURE (BAR),SPEED (RPM),TORQUE (N-M)\n" + rows(),
+    "past-midnight.csv": stamps("%H:%M:%S.%f", datetime(2026, 11, 2, 23, 59, 59, 950_000)),
+    "zone-without-colon.csv": stamps("%Y-%m-%dT%H:%M:%S.%f+0100"),
+    "chinese-dates.csv": stamps("%Y年%m月%d日 %H:%M:%S.%f"),
+    "thousands-french.csv": GERMAN + "\n" + grouped("\u202f", ","),
+    "thousands-blanks.csv": GERMAN + "\n" + grouped(" ", ","),
+    "means-below.csv": HEAD + "\n" + rows() + "\nMean,5,1000,20\nMax,5,1970,21\n",
+    "means-below-numbers.csv": "Nr," + HEAD + "\n1," + rows().replace("\n", "\n1,")[:-2] + "Mean,5,5,1000,20\n",
+    "words-below.csv": GERMAN + "\n" + rows(";", ",") + "Ende der Messung\nPrüfer: Meier\n",
+    "minus.csv": HEAD + "\n" + rows().replace("0.0000,", "−0.0000,", 1),
     "catman.asc": (("Datum:\t02.11.2026\nAbtastrate:\t100 Hz\n\nZeit  1 - Standardmessrate\tDrehmoment\tDrehzahl\tDruck\n"
                     "[s]\t[Nm]\t[1/min]\t[bar]\nT10F\tMX840\tMX460\tP8AP\n"
-                    + rows("\t", ",", ["time_s", "torque_nm", "speed_rpm", "pressure_bar"])).encode("cp1252"), None),
+                    + rows("\t", ",", ["time_s", "torque_nm", "speed_rpm", "pressure_bar"])).encode("cp1252")),
     "labels-before-each-row.txt": ("Kanal\tZeit\tDruck\tDrehzahl\tMoment\nEinheit\ts\tbar\t1/min\tNm\n"
                                    "Messrate\t100 Hz\t100 Hz\n"
-                                   "Sensor\t\tP8\tT10F\tT10F\n\t" + rows("\t", ",").replace("\n", "\n\t")[:-1], None),
+                                   "Sensor\t\tP8\tT10F\tT10F\n\t" + rows("\t", ",").replace("\n", "\n\t")[:-1]),
     "oscilloscope.csv": ('"Model Name","DL950"\n"TraceName","Pressure","Speed","Torque"\n"BlockSize",12,12,12\n'
                          '"VUnit","bar","rpm","Nm"\n"HResolution",10,10,10\n"HUnit","ms","ms","ms"\n"Date","2026/11/02"\n"Time","08:00:00"\n\n,'
-                         + rows(names=PLATEAUS).replace("\n", "\n,")[:-1], None),
+                         + rows(names=PLATEAUS).replace("\n", "\n,")[:-1]),
     "oscilloscope-with-places-of-memory.csv": (
         '"TraceName","Druck","Drehzahl","Moment"\n"VUnit","bar","rpm","Nm"\n"BlockSize",12,12,12\n"VDataType","IS2","IS2","IS2"\n'
-        '"HResolution",0.01,0.01,0.01\n"HUnit","s","s","s"\n\n,' + rows(names=PLATEAUS).replace("\n", "\n,")[:-1], None),
+        '"HResolution",0.01,0.01,0.01\n"HUnit","s","s","s"\n\n,' + rows(names=PLATEAUS).replace("\n", "\n,")[:-1]),
     "tribometer-with-a-large-t.csv": ("T,n,M,p\nsec,rpm,N*m,bar\n"
-                                      + rows(names=["time_s", "speed_rpm", "torque_nm", "pressure_bar"]), None),
-    "rate-above.csv": ("Sample rate [kHz];0,1\nOperator;X\n\np [bar];n [rpm];M [Nm]\n" + rows(";", ",", PLATEAUS), None),
-    "rate-in-a-comment.csv": ("# Sample rate: 100 Hz\np [bar],n [rpm],M [Nm]\n" + rows(names=PLATEAUS), None),
+                                      + rows(names=["time_s", "speed_rpm", "torque_nm", "pressure_bar"])),
+    "rate-above.csv": "Sample rate [kHz];0,1\nOperator;X\n\np [bar];n [rpm];M [Nm]\n" + rows(";", ",", PLATEAUS),
+    "rate-in-a-comment.csv": "# Sample rate: 100 Hz\np [bar],n [rpm],M [Nm]\n" + rows(names=PLATEAUS),
     "parts-of-seconds-beside.csv": ("Datum;Uhrzeit;ms;p [bar];n [rpm];M [Nm]\n" + "".join(
         f"02.11.2026;08:00:0{int(k > 5)};{(940 + 10 * k) % 1000};{line}\n"
-        for k, line in enumerate(rows(";", ",", PLATEAUS).splitlines())), None),
+        for k, line in enumerate(rows(";", ",", PLATEAUS).splitlines()))),
     "the-stored-rate-of-two.csv": ("Sample rate [Hz],1000\nStorage rate [Hz],100\n\np [bar],n [rpm],M [Nm]\n"
-                                   + rows(names=PLATEAUS), None),
+                                   + rows(names=PLATEAUS)),
     "means-among-rows.csv": (HEAD + ",Remark\n" + rows().replace("\n", ",\n")
                              .replace("0.0600,", "0.03,5,600,20.5,average\n0.0600,")
-                             .replace("0.1100,", "1 Mean,5,1500,19.5,\n0.1100,"), None),
-    "a-status-in-words.csv": (HEAD + ",Status\n" + rows().replace("\n", ",OK\n") + "0.12,5,1000,0.0,FAULT\n", None),
-    "the-time-before-its-date.csv": (stamps('"%H:%M:%S.%f 02.11.2026"'), None),
-    "an-oil-pressure.asc": ("Time  1 - default sample rate;p_Oel;n;Md\ns;bar;U/min;Nm\n" + rows(";"), None),
-    "interval-above.csv": ("Sampling interval,10ms\n\np [bar],n [rpm],M [Nm]\n" + rows(names=PLATEAUS), None),
+                             .replace("0.1100,", "1 Mean,5,1500,19.5,\n0.1100,")),
+    "a-status-in-words.csv": HEAD + ",Status\n" + rows().replace("\n", ",OK\n") + "0.12,5,1000,0.0,FAULT\n",
+    "the-time-before-its-date.csv": stamps('"%H:%M:%S.%f 02.11.2026"'),
+    "an-oil-pressure.asc": "Time  1 - default sample rate;p_Oel;n;Md\ns;bar;U/min;Nm\n" + rows(";"),
+    "interval-above.csv": "Sampling interval,10ms\n\np [bar],n [rpm],M [Nm]\n" + rows(names=PLATEAUS),
     "six-rows-of-titles.csv": ("Kanal;K1;K2;K3\nZeit;Druck;Drehzahl;Moment\ns;bar;1/min;Nm\nFilter;TP 100 Hz;;\n"
-                               "Ort;Kolben;Welle;Welle\n"
-                               "Sensor;P8;T10;T10\n" + rows(";", ","), None),
-    "numbers-of-columns.csv": ("Zeit;Druck;Drehzahl;Moment\n1;2;3;4\ns;bar;1/min;Nm\n" + rows(";", ","), None),
+                               "Ort;Kolben;Welle;Welle\n" "Sensor;P8;T10;T10\n" + rows(";", ",")),
+    "numbers-of-columns.csv": "Zeit;Druck;Drehzahl;Moment\n1;2;3;4\ns;bar;1/min;Nm\n" + rows(";", ","),
     "a-rule-below-titles.txt": ("  Zeit   Druck   Drehzahl   Moment\n  [s]    [bar]    [rpm]   [Nm]\n"
-                                " ------  ------  ------  ------\n" + rows("   "), None),
+                                " ------  ------  ------  ------\n" + rows("   ")),
     "table-of-markdown.md": ("| t [s] | p [bar] | n [rpm] | M [Nm] |\n|---|---|---|---|\n| "
-                             + rows(" | ").replace("\n", " |\n| ")[:-2], None),
-    "inch-in-a-title.csv": (GERMAN + ';d [3/4"]\n' + rows(";", ",").replace("\n", ";7\n"), None),
-    "signs-apart.csv": (HEAD + "\n" + rows().replace(",", ",+  "), None),
-    "fortran.txt": (HEAD.replace(",", "  ") + "\n" + rows("  ", number="%.6E").replace("E", "D"), None),
+                             + rows(" | ").replace("\n", " |\n| ")[:-2]),
+    "inch-in-a-title.csv": GERMAN + ';d [3/4"]\n' + rows(";", ",").replace("\n", ";7\n"),
+    "signs-apart.csv": HEAD + "\n" + rows().replace(",", ",+  "),
+    "fortran.txt": HEAD.replace(",", "  ") + "\n" + rows("  ", number="%.6E").replace("E", "D"),
     "time-by-another-name.csv": ("Zeit ab Start [s];Dauer Zeit [s];Druck [bar];Drehzahl [1/min];M [Nm]\n"
-                                 + re.sub(r"^([^;]*);", r"\1;4,5;", rows(";", ","), flags=re.MULTILINE), None),
+                                 + re.sub(r"^([^;]*);", r"\1;4,5;", rows(";", ","), flags=re.MULTILINE)),
     "two-times-that-agree.csv": ("Timestamp;Time (ms);p [bar];n [rpm];M [Nm]\n"
                                  + "".join(f"2026-11-02 08:00:00;{1000 * float(line[:6]):.0f}{line[6:]}\n"
-                                           for line in rows(";").splitlines()), None),
+                                           for line in rows(";").splitlines())),
     "a-time-a-channel.csv": ("Zeit_p [s];p [bar];Zeit_n [s];n [1/min];Zeit_M [s];M [Nm]\n"
-                             + "".join(f"{t};{p};{t};{n};{t};{m}\n"
-                                       for t, p, n, m in zip(*RECORD.values(), strict=True)), None),
+                             + each(lambda t, p, n, m: f"{t};{p};{t};{n};{t};{m}")),
     "device-behind-the-name.txt": ("time\tp_ist\\CAN:1\tn_ist\\CAN:1\tm_ist\\CAN:1\ns\tbar\trpm\tNm\n"
-                               "f8\tf8\tf8\tf8\n" + rows("\t"), None),
+                               "f8\tf8\tf8\tf8\n" + rows("\t")),
     "labview-of-several-times.lvm": (
         "LabVIEW Measurement\nX_Columns\tMulti\n***End_of_Header***\n\nChannels\t3\nY_Unit_Label\tbar\trpm\tNm\n"
         "X_Dimension\tTime\tTime\tTime\n***End_of_Header***\nX_Value\tPressure\tX_Value\tSpeed\tX_Value\tTorque\tComment\n"
-        + "".join(f"{t}\t{p}\t{t}\t{n}\t{t}\t{m}\n" for t, p, n, m in zip(*RECORD.values(), strict=True)), None),
+        + each(lambda t, p, n, m: f"{t}\t{p}\t{t}\t{n}\t{t}\t{m}")),
     "catman-step-above-each-column.asc": (
         "Channels: 3\n\nDruck\tDrehzahl\tDrehmoment\nbar\t1/min\tNm\nT0 = 02.11.2026\tT0 = 02.11.2026\tT0 = 02.11.2026\n"
-        "dt = 10 ms\tdt = 10 ms\tdt = 10 ms\n" + rows("\t", ",", PLATEAUS), None),
+        "dt = 10 ms\tdt = 10 ms\tdt = 10 ms\n" + rows("\t", ",", PLATEAUS)),
     "catman-names-of-rates.asc": ("Zeit  1 - Standardmessrate [s]\tDruck [bar]\tDrehzahl [1/min]\tDrehmoment [Nm]\n"
-                                  + rows("\t", ","), None),
-    "units-of-all-but-the-counter.csv": (
-        "Nr;Zeit;Druck;Drehzahl;Moment\ns;bar;1/min;Nm\n"
-        + "".join(f"{k};{line}\n" for k, line in enumerate(rows(";").splitlines())), None),
-    "r-write-table.txt": (
-        '"' + '" "'.join(RECORD) + '"\n'
-        + "".join(f'"{k}" {line}\n' for k, line in enumerate(rows(" ").splitlines(), 1)), None),
-    "pandas-names-over-units.csv": (",Pressure,Speed,Torque\n,bar,rpm,Nm\ntime_s,,,\n" + rows(), None),
-    "matlab-durations.csv": (HEAD.replace("time_s", "Time") + "\n" + re.sub("(?m)^(.{6})", r"\1 sec", rows()), None),
-    "polars-durations.csv": (HEAD.replace("time_s", "Time") + "\n" + re.sub("(?m)^(.{6})", r"PT\1S", rows()), None),
-    "long.csv": (long("time_s,variable,value", "{t},{channel},{value}"), None),
-    "long-with-units.csv": (long("Signal;Zeit;Wert;Einheit", "{name};00:00:{t:05.2f};{value};{unit}"), None),
-    "long-units-in-names.csv": (long("TagName\tTime [ms]\tValue\tQuality", "{name} [{unit}]\t{ms}\t{value}\tGood"), None),
-    "long-with-a-bad-value.csv": (
-        long("Tag,Time [s],Value,Quality", "{channel},{t},{value},Good").replace(
-            "20.0909,Good", "20.0909,Good\ntorque_nm,0.052,0,Bad"), None,
-    ),
+                                  + rows("\t", ",")),
+    "units-of-all-but-the-counter.csv": ("Nr;Zeit;Druck;Drehzahl;Moment\ns;bar;1/min;Nm\n"
+        + "".join(f"{k};{line}\n" for k, line in enumerate(rows(";").splitlines()))),
+    "r-write-table.txt": ('"' + '" "'.join(RECORD) + '"\n'
+        + "".join(f'"{k}" {line}\n' for k, line in enumerate(rows(" ").splitlines(), 1))),
+    "pandas-names-over-units.csv": ",Pressure,Speed,Torque\n,bar,rpm,Nm\ntime_s,,,\n" + rows(),
+    "matlab-durations.csv": HEAD.replace("time_s", "Time") + "\n" + re.sub("(?m)^(.{6})", r"\1 sec", rows()),
+    "polars-durations.csv": HEAD.replace("time_s", "Time") + "\n" + re.sub("(?m)^(.{6})", r"PT\1S", rows()),
+    "long.csv": long("time_s,variable,value", "{t},{channel},{value}"),
+    "long-with-units.csv": long("Signal;Zeit;Wert;Einheit", "{name};00:00:{t:05.2f};{value};{unit}"),
+    "long-units-in-names.csv": long("TagName\tTime [ms]\tValue\tQuality", "{name} [{unit}]\t{ms}\t{value}\tGood"),
+    "long-with-a-bad-value.csv": (long("Tag,Time [s],Value,Quality", "{channel},{t},{value},Good").replace(
+            "20.0909,Good", "20.0909,Good\ntorque_nm,0.052,0,Bad")),
     "labview-of-several-dates.lvm": (
         "LabVIEW Measurement\nX_Columns\tMulti\n***End_of_Header***\n\nChannels\t3\nY_Unit_Label\tbar\trpm\tNm\n"
         "***End_of_Header***\nX_Value\tPressure\tX_Value\tSpeed\tX_Value\tTorque\tComment\n"
-        + "".join(f"02.11.2026 07:00:{t:06.3f}\t{p}\t02.11.2026 07:00:{t:06.3f}\t{n}\t02.11.2026 07:00:{t:06.3f}\t{m}\n"
-                  for t, p, n, m in zip(*RECORD.values(), strict=True)), None),
+        + each(lambda t, *measured: "\t".join(f"02.11.2026 07:00:{t:06.3f}\t{value}" for value in measured))),
     "titles-of-two-words.txt": ("Time\tTorsional Torque\tTorsional Speed\tPiston Pressure\nsec\tN-m\trpm\tbar\n"
-                                + rows("\t", names=["time_s", "torque_nm", "speed_rpm", "pressure_bar"]), None),
+                                + rows("\t", names=["time_s", "torque_nm", "speed_rpm", "pressure_bar"])),
     "units-in-cells.csv": ("Zeit;Druck;Drehzahl;Drehmoment\n"
-                           + re.sub("(.*);(.*);(.*);(.*)", r"\1 s;\2 bar;\3 1/min;\4 Nm", rows(";", ",")), None),
-    "zone-by-name.csv": (stamps("%d.%m.%Y %H:%M:%S.%f MEZ"), None),
-    "zone-in-brackets.csv": (stamps("%Y-%m-%dT%H:%M:%S.%f+01:00[Europe/Berlin]"), None),
-    "german-months.csv": (stamps("27. Dez. 2026 %H:%M:%S.%f"), None),
-    "spanish-months.csv": (stamps("12-ene-26 %H:%M:%S.%f").replace("timestamp", "Fecha y hora"), None),
-    "english-months.csv": (stamps('"Nov 27, 2026 %I:%M:%S.%f %p"'), None),
-    "ranges-of-sensors.csv": ("t s,p 0-16 bar,n (0...3000 1/min),Torque [±200 Nm]\n" + rows(), None),
-    "places-in-titles.csv": ("Time [s],CH1-1 Pressure [bar],Drum.n_diff [rpm],Torque @ 80 °C [Nm]\n" + rows(), None),
-    "c-times.csv": (stamps("Fri Nov 27 %H:%M:%S.%f 2026"), None),
+                           + re.sub("(.*);(.*);(.*);(.*)", r"\1 s;\2 bar;\3 1/min;\4 Nm", rows(";", ","))),
+    "zone-by-name.csv": stamps("%d.%m.%Y %H:%M:%S.%f MEZ"),
+    "zone-in-brackets.csv": stamps("%Y-%m-%dT%H:%M:%S.%f+01:00[Europe/Berlin]"),
+    "german-months.csv": stamps("27. Dez. 2026 %H:%M:%S.%f"),
+    "spanish-months.csv": stamps("12-ene-26 %H:%M:%S.%f").replace("timestamp", "Fecha y hora"),
+    "english-months.csv": stamps('"Nov 27, 2026 %I:%M:%S.%f %p"'),
+    "ranges-of-sensors.csv": "t s,p 0-16 bar,n (0...3000 1/min),Torque [±200 Nm]\n" + rows(),
+    "places-in-titles.csv": "Time [s],CH1-1 Pressure [bar],Drum.n_diff [rpm],Torque @ 80 °C [Nm]\n" + rows(),
+    "c-times.csv": stamps("Fri Nov 27 %H:%M:%S.%f 2026"),
     "a-multiple-among-units.csv": ("Zeit;Druck;Drehzahl;Moment\ns;bar;1/min;0,01 kNm\n"
-                                   + "".join(f"{t};{p};{n};{m / 10}\n"
-                                             for t, p, n, m in zip(*RECORD.values(), strict=True)), None),
+                                   + each(lambda t, p, n, m: f"{t};{p};{n};{m / 10}")),
     "set-points.csv": ("Zeit [s];p Soll [bar];p Ist [bar];n_act [1/min];Torque (filtered)\n;;;;Nm\n"
-                       + re.sub("(?m)^([^;]*);", r"\1;9;", rows(";")), None),
+                       + re.sub("(?m)^([^;]*);", r"\1;9;", rows(";"))),
     "thousands-of-turns.csv": ("t [s],p [bar],n / 1000 min⁻¹,M [10⁻³ kNm]\n"
-                               + "".join(f"{t},{p},{n / 1000},{m}\n"
-                                         for t, p, n, m in zip(*RECORD.values(), strict=True)), None),
-    "dates-coarser-than-the-rate-above.csv": (
-        "Sampling interval,10ms\n\nDate&Time,p [bar],n [rpm],M [Nm]\n"
-        + "2026/11/02 07:00:00," + rows(names=PLATEAUS).replace("\n", "\n2026/11/02 07:00:00,")[:-20], None),
-    "long-mapped.csv": (long("t [s],ch,y", "{t},{channel}#1,{value}"),
-                        "pressure_bar:pressure_bar#1,speed_rpm:speed_rpm#1,torque_nm:torque_nm#1"),
+                               + each(lambda t, p, n, m: f"{t},{p},{n / 1000},{m}")),
+    "dates-coarser-than-the-rate-above.csv": ("Sampling interval,10ms\n\nDate&Time,p [bar],n [rpm],M [Nm]\n"
+        + "2026/11/02 07:00:00," + rows(names=PLATEAUS).replace("\n", "\n2026/11/02 07:00:00,")[:-20]),
+    "long-mapped.csv": long("t [s],ch,y", "{t},{channel}#1,{value}"),
 }  # fmt: skip
+
+
+#: The maps of those that need one.
+MAPS = {
+    "sjis.csv": "time_s:時間 (s),pressure_bar:圧力 (bar),speed_rpm:回転数 (rpm),torque_nm:トルク (Nm)",
+    "cyrillic.csv": "time_s:время,pressure_bar:давление,speed_rpm:обороты,torque_nm:момент",
+    "mapped.csv": "time_s:Zeit,pressure_bar:p1,speed_rpm:n1,torque_nm:Mz",
+    "dewesoft.csv": "time_s:Time,pressure_bar:p/AVE,speed_rpm:n/AVE,torque_nm:M/AVE",
+    "long-mapped.csv": "pressure_bar:pressure_bar#1,speed_rpm:speed_rpm#1,torque_nm:torque_nm#1",
+}
 
 
 @pytest.mark.parametrize("name", TEXTS)
 def test_a_text_gives_its_numbers(tmp_path: Path, name: str) -> None:
-    assert_record(read_content(tmp_path, *TEXTS[name], name=name))
+    assert_record(read_content(tmp_path, TEXTS[name], MAPS.get(name), name=name))
 
 
 def assert_record(read: Channels) -> None:
@@ -314,44 +315,29 @@ def test_counts_that_can_only_be_one_computers_are_times(tmp_path: Path, first: 
     assert notice.message == f"timestamp states no unit; its values were read as times in {unit}"
 
 
-def test_a_slower_channel_in_the_same_rows_is_brought_to_their_clock(tmp_path: Path) -> None:
-    """As exporters write several rates into one table: cells are empty where the slower channel has no sample."""
-    title = f"{GERMAN};Öltemperatur [°C]"
-    lines = [f"{line};{80 + row}" if row % 3 == 0 else f"{line};" for row, line in enumerate(rows(";").splitlines())]
-    read = read_content(tmp_path, "\n".join([title, *lines]) + "\n")
-    np.testing.assert_allclose(read.columns["oil_temperature_c"], 80 + np.minimum(np.arange(ROWS), 9), rtol=1e-12)
-    assert [notice.code for notice in read.notices] == ["brought_to_one_clock"]
-    lines[5:7] = [line.replace(";", ";;", 1).rpartition(";")[0] for line in lines[5:7]]
-    with pytest.raises(InvalidError, match=r"pressure_bar\[5\] \(line 7\) must be a number, got '': fill the cell"):
-        read_content(tmp_path, "\n".join([title, *lines]) + "\n")
-
-
-def test_dates_beside_each_channel_are_counted_from_one_moment(tmp_path: Path) -> None:
-    dates = [f"2026-11-02 07:00:{t:06.3f};{n};{p};2026-11-02 07:00:{t + 0.02:06.3f};{m}"
-             for t, p, n, m in zip(*RECORD.values(), strict=True)]  # fmt: skip
-    columns = read_content(tmp_path, "\n".join(["Zeit_n;n [rpm];p [bar];Zeit_M;M [Nm]", *dates]) + "\n").columns
-    np.testing.assert_allclose(columns["speed_rpm"], RECORD["speed_rpm"][2:], rtol=1e-9)
-
-
-def test_the_time_of_a_table_of_one_value_a_row_is_chosen(tmp_path: Path) -> None:
-    text = long("Tag,Start time [ms],Time [s],Value", "{channel},{ms},{t},{value}").replace(",0.0,0.0,", ",9.5,0.0,")
-    with pytest.raises(InvalidError, match="got Start time and Time; choose one with time=NAME"):
-        read_content(tmp_path, text)
-    assert_record(read_content(tmp_path, text, time="Time [s]"))
-
-
-def test_a_shorter_channel_has_the_times_beside_it(tmp_path: Path) -> None:
-    half = [f"{t};{p}" for t, p in zip(TIME[::2], RECORD["pressure_bar"][::2], strict=True)] + [";"] * (ROWS // 2)
-    whole = zip(TIME, RECORD["torque_nm"], RECORD["speed_rpm"], half, strict=True)
-    lines = ["Zeit_M [s];M [Nm];n [rpm];Zeit_p [s];p [bar]", *(";".join(map(str, row)) for row in whole)]
-    columns = read_content(tmp_path, "\n".join(lines) + "\n").columns
-    np.testing.assert_allclose(columns["pressure_bar"][:-1], RECORD["pressure_bar"][:-1], rtol=1e-9)
-
-
+#: As exporters write several rates into one table: cells are empty where the slower channel has no sample.
+SLOWER = [f"{line};{80 + row}" if row % 3 == 0 else f"{line};" for row, line in enumerate(rows(";").splitlines())]
+SLOWER_GAP = [
+    line.replace(";", ";;", 1).rpartition(";")[0] if row in (5, 6) else line for row, line in enumerate(SLOWER)
+]
+SLOWER_TITLE = f"{GERMAN};Öltemperatur [°C]\n"
+HALF = [f"{t};{p}" for t, p in zip(TIME[::2], RECORD["pressure_bar"][::2], strict=True)] + [";"] * (ROWS // 2)
+TWO_CLOCKS = long("Tag,Start time [ms],Time [s],Value", "{channel},{ms},{t},{value}").replace(",0.0,0.0,", ",9.5,0.0,")
+MERGED = ["time_s", "speed_rpm", "torque_nm", "pressure_bar"]
+FIVE = {"pressure_bar": [5.0] * 5, "speed_rpm": [20, 120, 520, 1020, 1970], "torque_nm": [20.9, 21.9, 21.4, 20.7, 19.9]}
 UNKNOWN_UNIT = "t [s];M [10 Nm]\n0;1\n1;2\n"
 THOUSANDS = "pressure_bar;speed_rpm;torque_nm\n5;800;21\n5;1.100;21\n"
 TWO_TABLES = "p [bar],M [Nm]\n5,1\n\nTest 2\np [bar],M [Nm]\n5,2\n"
-REFUSED: list[tuple[str, ...]] = [
+TWO_UNITS = "t [s];Mz;Mx [Nm]\n0;1;1\n1;2;2\n"
+DAYS = "Time,pressure_bar,speed_rpm,torque_nm\n" + "".join(
+    f"{0.33 + k / 86400:.12f},5,{100 + k},20\n" for k in range(ROWS)
+)
+#: Mapped titles of which it is not clear what unit or factor they mean.
+UNCLEAR = [("MzkNm", "kNm", 1e3), ("mean kNm of 3", "kNm", 1e3), ("MomNm", "mNm", 1e-3)]
+FACTORS = [("Mz x10", 0.1), ("Mz/100", 100.0), ("Mz x10 Nm", 0.1), ("Mz scaled by 100", 0.01)]
+SCALED = "pressure_bar,speed_rpm,{}\n5,100,20\n5,200,19\n"
+#: A text, words of its refusal, and how it is asked for.
+REFUSED: list[tuple[Any, ...]] = [
     ("t [s];M\n0;21 Nm\n1;22 mNm\n", "torque_nm[1] (line 3) must be a number in Nm, as in the first row, got '22 mNm'"),
     ("t [s];M [Nm]\n0;21\n1;22 Nm\n", "torque_nm[1] (line 3) must be a number, got '22 Nm'"),
     ("t [s];M\n0;21 Nm\n1;22\n", "torque_nm[1] (line 3) must be a number in Nm, as in the first row, got '22'"),
@@ -426,15 +412,105 @@ REFUSED: list[tuple[str, ...]] = [
     (HEAD + "\n0,5,n/a,20\n", "got 'n/a': add missing=n/a to leave out such rows"),
     (HEAD + "\n0,5,NaN,20\n", "got nan: add missing=nan to leave such rows out"),
     (HEAD + "\n" + rows() + "Mittelwert\n" + rows(), "line 14 must have 4 cells"),
+    (SLOWER_TITLE + "\n".join(SLOWER_GAP), "pressure_bar[5] (line 7) must be a number, got '': fill the cell"),
+    (TWO_CLOCKS, "got Start time and Time; choose one with time=NAME"),
+    (TWO_UNITS, "must be kNm, as the rig profile or map says, got 'Nm'", "torque_nm:Mx [kNm]"),
+    (TWO_TABLES.replace("5,1", "5,1e9"), "torque_nm[0] (line 2)", None, {"table": "1"}),
+    (TWO_TABLES.replace("5,2", "5,1e9"), "torque_nm[0] (line 6)", None, {"table": "2"}),
+    (DAYS, "in seconds or days", "time_s:Time"),
+    *(
+        (f"t [s];{title}\n0;1\n", f"may be {unit}: state it with map=torque_nm:{title} [{unit}]", f"torque_nm:{title}")
+        for title, unit, _ in UNCLEAR
+    ),
+    *((SCALED.format(title), f"[x{factor:g} Nm]", f"torque_nm:{title}") for title, factor in FACTORS),
 ]
 
 
 @pytest.mark.parametrize("case", REFUSED, ids=[words for _, words, *_ in REFUSED])
-def test_a_text_is_refused_with_words_that_help(tmp_path: Path, case: tuple[str, ...]) -> None:
-    content, words, *mapping = case
+def test_a_text_is_refused_with_words_that_help(tmp_path: Path, case: tuple[Any, ...]) -> None:
+    content, words, *asked = case
     with pytest.raises(InvalidError) as caught:
-        read_content(tmp_path, content, *mapping)
+        read_content(tmp_path, content, *asked[:1], **dict(*asked[1:]))
     assert words in caught.value.detail
+
+
+def marked(title: str, good: object, bad: object) -> str:
+    """The record with a column that marks its fourth row invalid."""
+    marks = [bad if row == 3 else good for row in range(ROWS)]
+    lines = [f"{line},{mark}" for line, mark in zip(rows().splitlines(), marks, strict=True)]
+    return "\n".join([f"{HEAD},{title}", *lines]) + "\n"
+
+
+#: A text that is no whole record, how it is asked for, some of the columns that it gives, and what is noticed.
+GIVEN: dict[str, tuple[str, dict[str, Any], dict[str, Any], list[str]]] = {
+    "a slower channel in the same rows": (
+        SLOWER_TITLE + "\n".join(SLOWER), {}, RECORD | {"oil_temperature_c": 80 + np.minimum(np.arange(ROWS), 9)},
+        ["brought_to_one_clock"],
+    ),
+    "dates beside each channel": (
+        "Zeit_n;n [rpm];p [bar];Zeit_M;M [Nm]\n" + each(
+            lambda t, p, n, m: f"2026-11-02 07:00:{t:06.3f};{n};{p};2026-11-02 07:00:{t + 0.02:06.3f};{m}"),
+        {}, {"speed_rpm": RECORD["speed_rpm"][2:]}, ["brought_to_one_clock"],
+    ),
+    "a shorter channel with times beside it": (
+        "Zeit_M [s];M [Nm];n [rpm];Zeit_p [s];p [bar]\n"
+        + each(lambda t, _, n, m: f"{t};{m};{n};{HALF[round(100 * t)]}"),
+        {}, {"pressure_bar": [*RECORD["pressure_bar"][:-1], 5.001]}, ["brought_to_one_clock"],
+    ),
+    "a time of two that is chosen": (TWO_CLOCKS, {"time": "Time [s]"}, RECORD, ["long_table"]),
+    "a time that is not wanted": (
+        "Zeit [s],p [bar],n [rpm],M [Nm]\n" + rows(), {"time": "none"}, {name: RECORD[name] for name in PLATEAUS}, [],
+    ),
+    "one option for every row without a value": (
+        f"{HEAD}\n"
+        + rows().replace("0.0300,5.0003", ",5.0003").replace("0.0500,5.0005", "0.0500,NaN").replace("20.0909", "---"),
+        {"missing": "---"}, {"time_s": np.delete(TIME, [3, 5, 5])}, ["invalid_samples"],
+    ),
+    "a table on its side": (
+        "\n".join(f"{name};{';'.join(map(str, column))}" for name, column in FIVE.items()), {}, FIVE, ["turned"],
+    ),
+    "a table on its side with units": (
+        "\n".join(f"{title};{';'.join(map(str, column))}" for title, column in zip(
+            ("Druck;bar", "Drehzahl;1/min", "Drehmoment;Nm"), FIVE.values(), strict=True)), {}, FIVE, ["turned"],
+    ),
+    "a title over merged cells": (  # only of the oil is a temperature known
+        "Messwerte,,,Öl,\n" + ",".join(NAMES[name] for name in MERGED) + ",Temperatur [°C]\n"
+        + "".join(f"{line},{60 + k}\n" for k, line in enumerate(rows(names=MERGED).splitlines())),
+        {}, RECORD | {"oil_temperature_c": range(60, 60 + ROWS)}, ["name_in_part"],
+    ),
+    "a unit in the map": (TWO_UNITS, {"mapping": "torque_nm:Mz [kNm]"}, {"torque_nm": [1000, 2000]}, ["columns_left_out"]),
+    "a multiple in the map": (UNKNOWN_UNIT, {"mapping": "torque_nm:M [x10 Nm]"}, {"torque_nm": [10, 20]}, []),
+    "the first of two tables": (TWO_TABLES, {"table": "1"}, {"torque_nm": [1]}, []),
+    "the second of two tables": (TWO_TABLES, {"table": "2"}, {"torque_nm": [2]}, []),
+    "thousands, by the option a decimal comma": (THOUSANDS, {"decimal": ","}, {"speed_rpm": [800, 1100]}, []),
+    "thousands, by the option a decimal point": (THOUSANDS, {"decimal": "."}, {"speed_rpm": [800, 1.1]}, []),
+    "fractions of a day": (DAYS, {"mapping": "time_s:Time [d]"}, {"speed_rpm": range(100, 100 + ROWS)}, []),
+    "fractions of the second beside it": (
+        "Time;ms;p [bar];n [rpm];M [Nm]\n" + "".join(
+            f"08:00:0{k // 4};{k % 4 * 250};{line}\n" for k, line in enumerate(rows(";", names=PLATEAUS).splitlines())),
+        {}, {"time_s": 0.25 * np.arange(ROWS)}, ["parts_of_seconds"],
+    ),
+    **{f"rows that {title} marks invalid": (
+        marked(title, good, bad), {}, {name: np.delete(column, 3) for name, column in RECORD.items()},
+        ["columns_left_out", "invalid_samples"],
+    ) for title, good, bad in (("M gültig", 1, 0), ("Quality", "Good", "Bad"), ("invalid", 0, 1))},
+    **{f"{title} as {unit}": (
+        f"t [s];{title}\n0;1\n1;2\n", {"mapping": f"torque_nm:{title} [{unit}]"}, {"torque_nm": [factor, 2 * factor]}, [],
+    ) for title, unit, factor in UNCLEAR},
+    **{f"{title} as {unit}": (
+        SCALED.format(title), {"mapping": f"torque_nm:{title} [{unit}]"}, {"torque_nm": [20 * times, 19 * times]}, [],
+    ) for title, factor in FACTORS for unit, times in ((f"x{factor:g} Nm", factor), ("Nm", 1.0))},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", GIVEN)
+def test_a_text_gives_what_it_is_asked_for(tmp_path: Path, name: str) -> None:
+    content, asked, expected, codes = GIVEN[name]
+    read = read_content(tmp_path, content, **asked)
+    assert [notice.code for notice in read.notices] == codes
+    assert read.columns.keys() == expected.keys() or len(expected) == 1
+    for channel, values in expected.items():
+        np.testing.assert_allclose(read.columns[channel], values, rtol=1e-9, atol=0, err_msg=channel)
 
 
 # --- numbers that are no measurements ---
@@ -453,7 +529,6 @@ def test_a_number_that_may_stand_for_no_value_needs_an_option(tmp_path: Path, ch
     with pytest.raises(InvalidError, match=rf"{channel}\[11\] \(line 13\)") as caught:
         read_content(tmp_path, text)
     missing = re.search(r"add missing=(\S+); to use", caught.value.detail)
-    assert missing is not None
     read = read_content(tmp_path, text, missing=missing[1])
     assert {name: column.tolist() for name, column in read.columns.items()} == {
         name: values[:-1].tolist() for name, values in RECORD.items()
@@ -482,17 +557,10 @@ def test_a_drop_to_a_number_of_nines_within_the_range_is_refused(tmp_path: Path)
         read_content(tmp_path, "\n".join(["speed_rpm", "0", *speeds]) + "\n")
 
 
-def test_one_option_leaves_out_every_row_without_a_value(tmp_path: Path) -> None:
-    text = rows().replace("0.0300,5.0003", ",5.0003").replace("0.0500,5.0005", "0.0500,NaN").replace("20.0909", "---")
-    columns = read_content(tmp_path, f"{HEAD}\n{text}", missing="---").columns
-    assert columns["time_s"].tolist() == np.delete(TIME, [3, 5, 5]).tolist()
-
-
 STATISTICS: dict[str, Callable[[np.ndarray], float]] = {
     "means": np.mean, "sums": np.sum, "maxima": np.max, "minima": np.min, "medians": np.median,
     "standard deviations": lambda column: np.std(column, ddof=1),
 }  # fmt: skip
-FIVE = {"pressure_bar": [5.0] * 5, "speed_rpm": [20, 120, 520, 1020, 1970], "torque_nm": [20.9, 21.9, 21.4, 20.7, 19.9]}
 
 
 @pytest.mark.parametrize("names", [*([name] for name in STATISTICS), ["means", "maxima", "minima"]], ids="-".join)
@@ -513,14 +581,6 @@ def test_rows_of_statistics_are_left_out(tmp_path: Path, held: dict[str, np.ndar
     assert ", ".join(names) in notice.message or (held is RECORD and names == ["medians"])  # which are its means too
 
 
-def test_a_table_on_its_side_is_read(tmp_path: Path) -> None:
-    for titles in ([f"{name};{{}}" for name in FIVE], ["Druck;bar;{}", "Drehzahl;1/min;{}", "Drehmoment;Nm;{}"]):
-        lines = [title.format(";".join(map(str, column))) for title, column in zip(titles, FIVE.values(), strict=True)]
-        read = read_content(tmp_path, "\n".join(lines) + "\n")
-        assert {name: column.tolist() for name, column in read.columns.items()} == FIVE
-        assert [notice.code for notice in read.notices] == ["turned"]
-
-
 def test_a_long_table_on_its_side_is_refused_and_not_read_in_part(tmp_path: Path) -> None:
     titles = ["Druck;bar", "Drehzahl;1/min", "Drehmoment;Nm", "Öltemperatur;°C"]
     lines = [";".join([title, *["10.25"] * 9000]) for title in titles]
@@ -537,38 +597,6 @@ def test_a_mapped_title_that_ends_in_a_unit_is_that_unit(tmp_path: Path, title: 
     lines = [f"{title};M [Nm]", *(f"{1000 * time};1" for time in TIME)]
     columns = read_content(tmp_path, "\n".join(lines) + "\n", f"time_s:{title}").columns
     np.testing.assert_allclose(columns["time_s"], TIME, rtol=0, atol=1e-12)
-
-
-@pytest.mark.parametrize(("title", "unit"), [("MzkNm", "kNm"), ("mean kNm of 3", "kNm"), ("MomNm", "mNm")])
-def test_a_mapped_title_of_unclear_unit_needs_it_in_the_map(tmp_path: Path, title: str, unit: str) -> None:
-    text = f"t [s];{title}\n0;1\n1;2\n"
-    with pytest.raises(InvalidError, match=rf"may be {unit}: state it with map=torque_nm:.* \[{unit}\]"):
-        read_content(tmp_path, text, f"torque_nm:{title}")
-    columns = read_content(tmp_path, text, f"torque_nm:{title} [{unit}]").columns
-    assert columns["torque_nm"].tolist() == [UNITS["Nm"][unit].factor, 2 * UNITS["Nm"][unit].factor]
-
-
-def test_a_unit_in_the_map_is_used_and_must_not_contradict_the_file(tmp_path: Path) -> None:
-    text = "t [s];Mz;Mx [Nm]\n0;1;1\n1;2;2\n"
-    assert read_content(tmp_path, text, "torque_nm:Mz [kNm]").columns["torque_nm"].tolist() == [1000, 2000]
-    with pytest.raises(InvalidError, match="must be kNm, as the rig profile or map says, got 'Nm'"):
-        read_content(tmp_path, text, "torque_nm:Mx [kNm]")
-    columns = read_content(tmp_path, UNKNOWN_UNIT, "torque_nm:M [x10 Nm]").columns
-    assert columns["torque_nm"].tolist() == [10, 20]
-
-
-@pytest.mark.parametrize("number", [1, 2])
-def test_one_of_tables_below_each_other_is_read_by_its_number(tmp_path: Path, number: int) -> None:
-    channels = read_content(tmp_path, TWO_TABLES, table=str(number))
-    assert channels.columns["torque_nm"].tolist() == [number]
-    with pytest.raises(InvalidError, match=rf"torque_nm\[0\] \(line {(2, 6)[number - 1]}\)"):
-        read_content(tmp_path, TWO_TABLES.replace(f"5,{number}", "5,1e9"), table=str(number))
-
-
-@pytest.mark.parametrize(("decimal", "speed"), [(",", 1100.0), (".", 1.1)])
-def test_an_option_settles_the_thousands(tmp_path: Path, decimal: str, speed: float) -> None:
-    columns = read_content(tmp_path, THOUSANDS, decimal=decimal).columns
-    assert columns["speed_rpm"].tolist() == [800.0, speed]
 
 
 # --- workbooks, MATLAB, HDF5, Parquet, ZIP ---
@@ -955,36 +983,6 @@ def test_a_scale_of_tdms_is_applied_or_refused(tmp_path: Path, kind: str, words:
         np.testing.assert_allclose(torque, [1.75, 6.0, 22.75])
 
 
-@pytest.mark.parametrize(
-    ("title", "factor"), [("Mz x10", 0.1), ("Mz/100", 100.0), ("Mz x10 Nm", 0.1), ("Mz scaled by 100", 0.01)]
-)
-def test_a_mapped_title_that_may_be_scaled_needs_its_factor(tmp_path: Path, title: str, factor: float) -> None:
-    text = f"pressure_bar,speed_rpm,{title}\n5,100,20\n5,200,19\n"
-    with pytest.raises(InvalidError, match=rf"\[x{factor:g} Nm\]"):
-        read_content(tmp_path, text, f"torque_nm:{title}")
-    for unit, expected in ((f"x{factor:g} Nm", 20 * factor), ("Nm", 20.0)):
-        columns = read_content(tmp_path, text, f"torque_nm:{title} [{unit}]").columns
-        np.testing.assert_allclose(columns["torque_nm"][0], expected)
-
-
-@pytest.mark.parametrize(("title", "good", "bad"), [("M gültig", 1, 0), ("Quality", "Good", "Bad"), ("invalid", 0, 1)])
-def test_rows_that_a_column_marks_invalid_are_left_out(tmp_path: Path, title: str, good: object, bad: object) -> None:
-    marks = [bad if row == 3 else good for row in range(ROWS)]
-    lines = [f"{line},{mark}\n" for line, mark in zip(rows().splitlines(), marks, strict=True)]
-    read = read_content(tmp_path, f"{HEAD},{title}\n" + "".join(lines))
-    np.testing.assert_allclose(read.columns["torque_nm"], np.delete(RECORD["torque_nm"], 3))
-    assert "invalid_samples" in [notice.code for notice in read.notices]
-
-
-def test_fractions_of_a_day_are_refused_until_the_map_says_what_they_are(tmp_path: Path) -> None:
-    lines = [f"{0.33 + row / 86400:.12f},5,{100 + row},20\n" for row in range(ROWS)]
-    text = "Time,pressure_bar,speed_rpm,torque_nm\n" + "".join(lines)
-    with pytest.raises(InvalidError, match="in seconds or days"):
-        read_content(tmp_path, text, "time_s:Time")
-    read = read_content(tmp_path, text, "time_s:Time [d]")
-    np.testing.assert_allclose(np.diff(read.columns["time_s"]), 1, atol=1e-4)
-
-
 def test_a_clock_above_the_table_of_a_sheet_is_used_and_a_hidden_sheet_is_not(tmp_path: Path) -> None:
     book = openpyxl.Workbook()
     hidden = book.create_sheet("raw")
@@ -1003,26 +1001,3 @@ def _grouped(cell: str, decimal: str, thousands: str) -> str:
     if thousands and "e" not in cell:
         whole = f"{int(whole):,}".replace(",", thousands)
     return whole + (decimal + fraction if point else "")
-
-
-def test_fractions_of_the_second_that_were_added_are_said_to_have_been(tmp_path: Path) -> None:
-    lines = [f"08:00:0{k // 4};{k % 4 * 250};{line}" for k, line in enumerate(rows(";", names=PLATEAUS).splitlines())]
-    got = read_content(tmp_path, "\n".join(["Time;ms;p [bar];n [rpm];M [Nm]", *lines]))
-    np.testing.assert_allclose(got.columns["time_s"], 0.25 * np.arange(ROWS))
-    (notice,) = got.notices
-    assert (notice.code, "the fractions in ms were added" in notice.message) == ("parts_of_seconds", True)
-
-
-def test_a_time_that_is_not_wanted_is_not_said_to_be_left_out(tmp_path: Path) -> None:
-    content = "\n".join(["Zeit [s],p [bar],n [rpm],M [Nm]", rows()])
-    got = read_content(tmp_path, content, time="none")
-    assert (got.columns.keys(), got.notices) == (set(PLATEAUS), ())
-
-
-def test_a_title_over_merged_cells_is_that_of_each_column_below(tmp_path: Path) -> None:
-    """Only of the oil is a temperature known."""
-    names = ["time_s", "speed_rpm", "torque_nm", "pressure_bar"]
-    lines = [f"{line},{60 + k}" for k, line in enumerate(rows(names=names).splitlines())]
-    titles = ["Messwerte,,,Öl,", ",".join([*(NAMES[name] for name in names), "Temperatur [°C]"])]
-    got = read_content(tmp_path, "\n".join([*titles, *lines]))
-    assert got.columns["oil_temperature_c"].tolist() == list(range(60, 60 + ROWS))

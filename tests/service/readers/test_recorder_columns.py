@@ -20,9 +20,6 @@ from tests.support import one_quick
 
 Writer = Callable[..., Path]
 FORMATS: list[tuple[Writer, str]] = [(write_tdms, "a.tdms"), (write_mdf, "a.mf4"), (write_parquet, "a.parquet")]
-WRITERS = pytest.mark.parametrize(("write", "name"), FORMATS)
-#: What comes after a format was taken apart.
-AFTERWARDS = pytest.mark.parametrize(("write", "name"), one_quick(FORMATS))
 GERMAN = {"M": "kNm", "n": "rad/s", "p": "MPa", "Öltemperatur": "K"}
 
 
@@ -36,7 +33,7 @@ def read(path: Path, mapping: str | None = None) -> dict[str, FloatArray]:
     return read_file(path, filename=path.name, reading=reading_of(mapping)).columns
 
 
-@WRITERS
+@pytest.mark.parametrize(("write", "name"), FORMATS)
 def test_columns_come_back_bit_for_bit(tmp_path: Path, write: Writer, name: str) -> None:
     columns = record()
     got = read(write(tmp_path / name, columns, units=UNITS))
@@ -45,28 +42,20 @@ def test_columns_come_back_bit_for_bit(tmp_path: Path, write: Writer, name: str)
         assert got[channel].tobytes() == column.tobytes()
 
 
-@AFTERWARDS
-def test_units_are_converted_and_names_understood(tmp_path: Path, write: Writer, name: str) -> None:
+@pytest.mark.parametrize(("write", "name"), one_quick(FORMATS))
+def test_units_are_converted_names_understood_unknown_channels_listed_and_too_many_values_refused(
+    tmp_path: Path, write: Writer, name: str
+) -> None:
     columns = record(200)
     got = read(write(tmp_path / name, german(columns), units=GERMAN))
     assert got.keys() == columns.keys()
     for channel, column in columns.items():
         np.testing.assert_allclose(got[channel], column, rtol=1e-13)
-
-
-@AFTERWARDS
-def test_channels_that_are_not_known_are_left_out_and_listed(tmp_path: Path, write: Writer, name: str) -> None:
-    columns = record(50)
     columns["Mz"] = columns.pop("torque_nm")
     path = write(tmp_path / name, columns, units={})
     (notice,) = read_file(path, filename=name).notices
     assert (notice.code, "Mz" in notice.message) == ("columns_left_out", True)
     assert read(path, "torque_nm:Mz")["torque_nm"].tobytes() == columns["Mz"].tobytes()
-
-
-@AFTERWARDS
-def test_too_many_values_are_too_large(tmp_path: Path, write: Writer, name: str) -> None:
-    path = write(tmp_path / name, record(), units=UNITS)
     with pytest.raises(TooLargeError, match="must not hold more than 100 values"):
         read_file(path, filename=name, limits=replace(LIMITS, most_values=100))
 

@@ -80,6 +80,7 @@ def test_numbers_are_read_as_python_reads_them(tmp_path: Path, number: str) -> N
         '"time_s" , "pressure_bar" , "speed_rpm" , "torque_nm"\n"0","5","100","20"\n"0.1","5","101","21"\n',
         f"{HEADER}\n0 , 5, 100,20\n# a pause\n\n 0.1,5 ,101, 21",
         "time_ms\tpressure_kPa\tspeed_rpm\tTorque Nm\n0\t500\t100\t20\n100\t500\t101\t21\n",
+        f"time_s,pressure_bar,speed_rpm,torque\r[s],[bar],[rpm],[Nm]\n{ROWS}",
         f"{HEADER}\n0e0,+5.,1E2,2.0e+1\n1e-1,.5e1,101,2100e-2\n",
     ],
 )
@@ -322,11 +323,6 @@ def test_what_is_known_is_far_below_the_bounds() -> None:
 )
 def test_a_number_is_what_it_was(text: str, number: int) -> None:
     assert (NUMBER.fullmatch(text) is not None) == bool(number)
-
-
-def test_a_carriage_return_ends_a_line() -> None:
-    text = "time_s,torque\r[s],[Nm]\n" + "".join(f"{n}.0,2\n" for n in range(3))
-    assert outcome(text) == "time_s,torque_nm"
 
 
 def test_a_title_is_taken_apart_in_few_steps(monkeypatch: pytest.MonkeyPatch) -> None:
