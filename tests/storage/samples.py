@@ -4,7 +4,7 @@ import os
 import sqlite3
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from dataclasses import replace
 from functools import cache
@@ -20,6 +20,7 @@ from sqlalchemy import Connection, text
 from storage import channels, clutches, runs
 from storage.clutches import ClutchRow
 from storage.diagnoses import DiagnosisRow
+from storage.engine.database import Database
 from storage.engine.opening import open_database
 from storage.migrations import upgrade as migrations
 from storage.results import FitRow
@@ -112,6 +113,18 @@ def lay_empty(path: Path) -> None:
         path.write_bytes(_empty())
 
 
+def read_from(database: Database, function: Callable[..., Any], *arguments: Any, **named: Any) -> Any:
+    """What a function of storage reads, in a transaction of its own."""
+    with database.reading() as connection:
+        return function(connection, *arguments, **named)
+
+
+def write_to(database: Database, function: Callable[..., Any], *arguments: Any, **named: Any) -> Any:
+    """Have a function of storage write, in a transaction of its own; what it returns."""
+    with database.writing() as connection:
+        return function(connection, *arguments, **named)
+
+
 def store_run(connection: Connection, number: int, *, length: int = 40) -> int:
     """One accepted run as the workflow writes it: the run, its channels and the clutch's revision."""
     run_key = runs.insert(connection, new_run(number))
@@ -126,8 +139,6 @@ def child(script: str, *arguments: object) -> Iterator[tuple["subprocess.Popen[s
     command = [sys.executable, "-c", script, *map(str, arguments)]
     root = Path(__file__).parents[2]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=root) as process:
-        assert process.stdin is not None
-        assert process.stdout is not None
         try:
             yield process, process.stdin, process.stdout
         finally:

@@ -68,7 +68,6 @@ def test_a_delivery_is_somebodys_for_a_while_then_anybodys(database: Database) -
         assert (again.delivery_id, again.attempts, again.problem) == ("d1", 3, "no")
         webhooks.end(connection, again.delivery_key, webhooks.DELIVERED, at=AT, status=200, problem=None)
         stored = webhooks.find_delivery(connection, "d1")
-        assert stored is not None
         assert (stored.state, stored.delivered_at, stored.problem) == (webhooks.DELIVERED, AT, None)
         assert webhooks.count_waiting(connection) == 2
         webhooks.remove(connection, "w")
@@ -78,6 +77,5 @@ def test_a_delivery_is_somebodys_for_a_while_then_anybodys(database: Database) -
 def test_since_when_a_rig_is_silent_is_noted_with_the_state(connection: Connection) -> None:
     clutches.set_silent(connection, CLUTCH, AT, state="check")
     row = clutches.get(connection, CLUTCH)
-    assert row is not None
     assert (row.silent, row.state) == (AT, "check")
     assert alarms.last_heard(connection, [CLUTCH]) == {}

@@ -14,7 +14,7 @@ from storage.blobs.stores import DATABASE, open_store
 from storage.encoding import LONG
 from storage.engine.database import Database
 from storage.engine.errors import DamagedData
-from tests.storage.samples import clutch_row, columns, new_run
+from tests.storage.samples import clutch_row, columns, new_run, read_from
 
 
 def test_channels_keep_their_order_and_their_bits_and_are_written_once(connection: Connection) -> None:
@@ -89,9 +89,7 @@ def test_columns_keep_their_bits_wherever_they_are(database: Database, place: st
 
 def test_a_column_that_is_damaged_or_missing_in_its_store_is_named(database: Database, raw_address: str) -> None:
     run_key = store_long_run(database, raw_address, columns(7, 50_000))
-    with database.reading() as connection:
-        one = channels.stored(connection, run_key, "torque_nm")
-    assert one.blob is not None
+    one = read_from(database, channels.stored, run_key, "torque_nm")
     store = open_store(raw_address)
     whole = store.get(one.blob)
     store.put(one.blob, whole[:-1])

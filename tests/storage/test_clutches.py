@@ -10,7 +10,7 @@ from sqlalchemy.exc import IntegrityError
 from storage import clutches, runs
 from storage.clutches import Choice, Counts
 from storage.engine.database import Database
-from tests.storage.samples import CLUTCH, clutch_row, new_run
+from tests.storage.samples import CLUTCH, clutch_row, new_run, read_from, write_to
 
 NAMED = {"life": "", "state": "normal", "if_disputed": "normal"}
 
@@ -90,8 +90,7 @@ def fleet(database: Database) -> Database:
 
 
 def ids(database: Database, choice: Choice = IN_USE, *, by_name: bool = False) -> list[str]:
-    with database.reading() as connection:
-        return [row.clutch_id for row in clutches.page(connection, choice, limit=9, by_name=by_name)]
+    return [row.clutch_id for row in read_from(database, clutches.page, choice, limit=9, by_name=by_name)]
 
 
 @pytest.mark.parametrize(
@@ -118,18 +117,10 @@ def ids(database: Database, choice: Choice = IN_USE, *, by_name: bool = False) -
 def test_a_choice_is_listed_and_counted(fleet: Database, choice: Choice, worst_first: list[str]) -> None:
     assert ids(fleet, choice) == worst_first
     assert ids(fleet, choice, by_name=True) == sorted(worst_first)
-    with fleet.reading() as connection:
-        counts = clutches.counts(connection, choice)
+    counts = read_from(fleet, clutches.counts, choice)
     states = [FLEET[clutch_id][1] for clutch_id in worst_first]
     held = [clutch_id for clutch_id in worst_first if clutch_id in ("b-3", "gone")]
     assert counts == Counts(states={state: states.count(state) for state in set(states)}, held=len(held))
-
-
-def test_what_an_edit_changes_is_searched_for(fleet: Database) -> None:
-    with fleet.writing() as connection:
-        content = {"record": {"friction_material": "sintered"}, "content_sha256": "cd", "registered": None}
-        clutches.set_record(connection, "c-4", **content, archived=False)
-    assert (ids(fleet, Choice(find="SINTER")), ids(fleet, Choice(find="paper"))) == (["c-4"], [])
 
 
 def test_a_walk_by_name_meets_each_clutch_once_while_ranks_change_and_one_worst_first_does_not(fleet: Database) -> None:
@@ -154,7 +145,7 @@ def test_a_walk_by_name_meets_each_clutch_once_while_ranks_change_and_one_worst_
     assert walked(by_name=True) == ["A-1", "a-2", "b-3", "c-4"]
 
 
-def test_a_part_of_a_list_and_the_clutch_at_a_share_of_the_ranks(fleet: Database) -> None:
+def test_a_part_of_a_list_the_clutch_at_a_share_of_the_ranks_and_what_an_edit_changes(fleet: Database) -> None:
     whole = ids(fleet)
     with fleet.reading() as connection:
         for left_out in range(5):
@@ -168,6 +159,9 @@ def test_a_part_of_a_list_and_the_clutch_at_a_share_of_the_ranks(fleet: Database
         assert [at(0.0), at(0.5), at(0.9), at(1.0)] == ["a-2", "b-3", "b-3", "A-1"]
         assert at(1.0, below=100.0) == "c-4"
         assert at(0.9, Choice(only=())) is None
+    content = {"record": {"friction_material": "sintered"}, "content_sha256": "cd", "registered": None}
+    write_to(fleet, clutches.set_record, "c-4", **content, archived=False)
+    assert (ids(fleet, Choice(find="SINTER")), ids(fleet, Choice(find="paper"))) == (["c-4"], [])
 
 
 def test_a_dispute_counts_in_its_life(connection: Connection) -> None:
@@ -175,7 +169,6 @@ def test_a_dispute_counts_in_its_life(connection: Connection) -> None:
         disputed = "out_of_specification"
         clutches.set_summary(connection, CLUTCH, 1.0, {}, life=life, state="normal", if_disputed=disputed)
         row = clutches.get(connection, CLUTCH)
-        assert row is not None
         return row.state
 
     assert summarised("") == "normal"

@@ -23,7 +23,6 @@ def connection(connection: Connection) -> Connection:
 
 def test_a_diagnosis_runs_and_ends_once(connection: Connection) -> None:
     row = diagnoses.get(connection, CLUTCH, "d0")
-    assert row is not None
     assert (row.status, row.report, row.as_of_cycles, row.last_run_key) == (RUNNING, None, 1000.0, 1)
     assert diagnoses.finish(connection, "d0", "later", {"verdict": "model_adequate"}, {"effects": []})
     assert not diagnoses.fail(connection, "d0", "later still", "too late")

@@ -40,9 +40,7 @@ def connection(connection: Connection) -> Connection:
 
 
 def claimed(connection: Connection, claimer: str, second: int = 1, lease: float = 60.0) -> JobRow:
-    row = jobs.claim(connection, claimer, ["diagnosis"], lease=lease, at=AT.format(second))
-    assert row is not None
-    return row
+    return jobs.claim(connection, claimer, ["diagnosis"], lease=lease, at=AT.format(second))
 
 
 def test_a_clutch_with_many_jobs_does_not_hold_up_another(connection: Connection) -> None:
@@ -76,7 +74,6 @@ def test_a_job_is_the_claimer_s_alone_until_it_ends(connection: Connection) -> N
     assert jobs.end(connection, "j0", FAILED, AT.format(2), problem="it broke", claimer="one")
     assert not jobs.end(connection, "j0", CANCELLED, AT.format(3))
     ended = jobs.get(connection, "j0")
-    assert ended is not None
     assert (ended.state, ended.problem, ended.progress) == (FAILED, "it broke", {"step": "reads"})
     assert ended.finished_at == AT.format(2)
 
@@ -91,16 +88,12 @@ def test_a_job_whose_lease_has_run_out_is_claimed_again(connection: Connection) 
     assert not jobs.end(connection, "j0", FINISHED, AT.format(4), claimer="one")
 
 
-def test_a_job_that_is_given_back_was_not_begun(connection: Connection) -> None:
+def test_a_job_that_is_given_back_was_not_begun_and_what_nobody_holds_any_more_is_free(connection: Connection) -> None:
     claimed(connection, "one")
     jobs.release(connection, "j0", "two")
     jobs.release(connection, "j0", "one")
     row = jobs.get(connection, "j0")
-    assert row is not None
     assert (row.state, row.attempts, row.claimed_by) == (WAITING, 0, None)
-
-
-def test_what_nobody_holds_any_more_is_free(connection: Connection) -> None:
     for second in range(1, 5):
         claimed(connection, "one", second)
     assert not jobs.any_free(connection, ["diagnosis"])
@@ -122,7 +115,6 @@ def test_pages_are_newest_first_and_narrowed(connection: Connection) -> None:
     assert jobs.count_open(connection, "replay") == 0
     jobs.set_arguments(connection, "j0", {"adopt_by": "local"})
     changed = jobs.get(connection, "j0")
-    assert changed is not None
     assert changed.arguments == {"adopt_by": "local"}
 
 

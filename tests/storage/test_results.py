@@ -45,7 +45,7 @@ def test_predictions_as_they_would_have_been_said_then(connection: Connection) -
         results.put_predictions(connection, "nobody", [prediction(0.0)])
 
 
-def test_fits_come_back_and_are_replaced(connection: Connection) -> None:
+def test_fits_come_back_are_replaced_and_have_sixteen_finite_covariances_and_a_run(connection: Connection) -> None:
     late, early, bare = (runs.insert(connection, new_run(number)) for number in (2, 1, 3))
     without = fit_row(1e5, mse_percent=None)
     results.write_fits(connection, late, [fit_row(5e5), without])
@@ -56,19 +56,15 @@ def test_fits_come_back_and_are_replaced(connection: Connection) -> None:
     assert list(of_clutch) == [early, late]
     assert of_clutch == {early: [fit_row(4e5)], late: [without, fit_row(5e5)]}
     assert results.fits_of(connection, "unknown") == {}
-
-
-def test_a_fit_has_sixteen_finite_covariances_and_a_run(connection: Connection) -> None:
-    key = runs.insert(connection, new_run())
     for wrong, says in (
         (fit_row(1e5, covariance=(1.0, 2.0, 3.0)), "16 numbers, got 3"),
         (fit_row(1e5, covariance=(nan,) * 16), "not JSON compliant"),
         (fit_row(1e5, unbiased_covariance=(1.0,)), "unbiased_covariance must hold 16 numbers, got 1"),
     ):
         with pytest.raises(ValueError, match=says):
-            results.write_fits(connection, key, [wrong])
+            results.write_fits(connection, bare, [wrong])
     with pytest.raises(IntegrityError), connection.begin_nested():
-        results.write_fits(connection, key, [fit_row(1e5, rmse=nan)])
+        results.write_fits(connection, bare, [fit_row(1e5, rmse=nan)])
     with pytest.raises(IntegrityError, match=r"(?i)foreign key"), connection.begin_nested():
         results.write_fits(connection, 99, [fit_row(1e5)])
 

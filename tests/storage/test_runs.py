@@ -16,7 +16,6 @@ def test_a_run_comes_back_as_it_was_stored_belongs_to_a_clutch_and_has_an_id_of_
     keys = [runs.insert(connection, new_run(number)) for number in range(2)]
     for number, key in enumerate(keys):
         stored = runs.get(connection, CLUTCH, f"run-{number:04d}")
-        assert stored is not None
         assert asdict(stored) == {**asdict(new_run(number)), "run_key": key}
     assert runs.get(connection, CLUTCH, "unknown") is None
     assert runs.get(connection, "unknown", "run-0000") is None
@@ -57,7 +56,7 @@ def test_runs_of_one_kind_and_without_a_limit(connection: Connection) -> None:
     assert runs.page(connection, CLUTCH, kind="maintenance") == []
 
 
-def test_only_accepted_runs_are_part_of_the_history(connection: Connection) -> None:
+def test_only_accepted_runs_are_part_of_the_history_and_a_rebuild_that_is_held_is_none(connection: Connection) -> None:
     held = replace(new_run(1), state=runs.HELD, doubts=[{"code": "odd"}])
     keys = [runs.insert(connection, row) for row in (new_run(0), held, new_run(2))]
     runs.set_state(connection, keys[2], state=runs.WITHDRAWN, cycles=7.0, sent_cycles=2000.0, doubts=())
@@ -67,16 +66,12 @@ def test_only_accepted_runs_are_part_of_the_history(connection: Connection) -> N
     (found,) = runs.page(connection, CLUTCH, state=runs.HELD)
     assert (found.state, found.doubts, found.sent_cycles) == ("held", ({"code": "odd"},), None)
     withdrawn = runs.get(connection, CLUTCH, "run-0002")
-    assert withdrawn is not None
     assert (withdrawn.state, withdrawn.cycles, withdrawn.sent_cycles) == ("withdrawn", 7.0, 2000.0)
     assert len(runs.page(connection, CLUTCH)) == 3
-
-
-def test_a_rebuild_that_is_held_is_none(connection: Connection) -> None:
-    rebuild = replace(new_run(0), kind="maintenance", details={"event": "rebuild"})
+    rebuild = replace(new_run(3), kind="maintenance", details={"event": "rebuild"})
     runs.insert(connection, rebuild)
     runs.insert(connection, replace(rebuild, run_id="held", state=runs.HELD))
-    assert [row.run_id for row in runs.rebuilds(connection, CLUTCH)] == ["run-0000"]
+    assert [row.run_id for row in runs.rebuilds(connection, CLUTCH)] == ["run-0003"]
 
 
 def test_a_receipt_is_replaced_and_an_unknown_run_is_named(connection: Connection) -> None:

@@ -12,6 +12,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing, suppress
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -35,7 +36,7 @@ from tests.service.work.waiting import until
 from tests.service.workflows import stand_in_engine
 from tests.service.workflows.benches import Bench, body, stood_in
 from tests.storage.engine.postgresql.server import PostgresServer, postgresql_server
-from tests.storage.samples import OLD, integrity, old_database, revision
+from tests.storage.samples import OLD, integrity, old_database, read_from, revision
 from tests.support import ONCE, Server, one_quick, serving, stationary
 
 #: Channels of runs, bit for bit, by clutch and run.
@@ -75,6 +76,15 @@ def duration(act: Callable[[], object]) -> float:
     started = time.perf_counter()
     os.waitpid(forked(act), 0)
     return time.perf_counter() - started
+
+
+def kills_of(act: Callable[[], object], number: int, lay: Callable[[], object] = lambda: None) -> Iterator[bool]:
+    """Do something so many times, each from the start that `lay` makes, killed a little later each time; whether it had
+    come to its end."""
+    longest = duration(act)
+    for kill in range(number):
+        lay()
+        yield killed_after(longest * kill / number, act)
 
 
 def lay_again(path: Path, source: Path) -> None:
@@ -179,12 +189,9 @@ def test_a_migration_that_is_killed_is_whole_or_not_begun(tmp_path: Path, number
     path = tmp_path / "a.db"
     url = f"sqlite:///{path}"
     shutil.copyfile(source, path)
-    longest = duration(lambda: open_database(url).close())
     name = f"a.db-before-{head()}"
     seen = set()
-    for kill in range(number):
-        lay_again(path, source)
-        killed_after(longest * kill / number, lambda: open_database(url).close())
+    for _ in kills_of(lambda: open_database(url).close(), number, lambda: lay_again(path, source)):
         seen.add(revision(path))
         assert integrity(path) == ["ok"]
         if revision(path) == head():
@@ -210,14 +217,11 @@ def filled(tmp_path: Path) -> Path:
 def test_a_backup_that_is_killed_harms_nothing_and_is_never_half_a_file(
     tmp_path: Path, filled: Path, number: int
 ) -> None:
-    url = f"sqlite:///{filled}"
+    url, copy = f"sqlite:///{filled}", tmp_path / "copy.db"
     content = stored(filled)
-    longest = duration(lambda: back_up(url, tmp_path / "first.db"))
-    for kill in range(number):
-        copy = tmp_path / f"copy-{kill}.db"
-        ended = killed_after(longest * kill / number, lambda copy=copy: back_up(url, copy))
+    for finished in kills_of(lambda: back_up(url, copy), number, lambda: copy.unlink(missing_ok=True)):
         whole = copy.exists() and copy.stat().st_size > 0
-        assert whole or not ended
+        assert whole or not finished
         if whole:
             assert stored(copy) == content
     assert findings(filled) == []
@@ -230,10 +234,7 @@ def test_a_restore_that_is_killed_leaves_one_of_the_two_whole(tmp_path: Path, fi
     with closing(open_database(url)) as database, database.writing() as connection:
         connection.exec_driver_sql("UPDATE clutch SET created_at = 'since'")
     back_up(url, tmp_path / "since.db")
-    longest = duration(lambda: restore(url, backup))
-    for kill in range(number):
-        lay_again(filled, tmp_path / "since.db")
-        killed_after(longest * kill / number, lambda: restore(url, backup))
+    for _ in kills_of(lambda: restore(url, backup), number, lambda: lay_again(filled, tmp_path / "since.db")):
         assert integrity(filled) == ["ok"]
         kept = [each for each in tmp_path.glob("a.db-replaced*") if created(each) == "since"]
         assert created(filled) == "since" or kept
@@ -242,10 +243,8 @@ def test_a_restore_that_is_killed_leaves_one_of_the_two_whole(tmp_path: Path, fi
 
 
 def created(path: Path) -> str:
-    with closing(find_database(f"sqlite:///{path}")) as database, database.reading() as connection:
-        clutch = clutches.get(connection, "c1")
-    assert clutch is not None
-    return clutch.created_at
+    with closing(find_database(f"sqlite:///{path}")) as database:
+        return read_from(database, clutches.get, "c1").created_at
 
 
 @kills(2, 50)
@@ -260,13 +259,11 @@ def test_an_adoption_that_is_killed_is_whole_or_not_begun(
         bench.database.close()
         url = f"sqlite:///{tmp_path / 'a.db'}"
         back_up(url, tmp_path / "before.db")
-        longest = duration(lambda: adopt_on(url))
-        for kill in range(number):
-            lay_again(tmp_path / "a.db", tmp_path / "before.db")
-            ended = killed_after(longest * kill / number, lambda: adopt_on(url))
-            with closing(open_database(url)) as database, database.reading() as connection:
-                versions = assumptions.adoptions_of(connection, "c1")
-            assert len(versions) in ((1,) if ended else (0, 1))
+        laid = partial(lay_again, tmp_path / "a.db", tmp_path / "before.db")
+        for finished in kills_of(lambda: adopt_on(url), number, laid):
+            with closing(open_database(url)) as database:
+                versions = read_from(database, assumptions.adoptions_of, "c1")
+            assert len(versions) in ((1,) if finished else (0, 1))
             assert findings(tmp_path / "a.db") == []
 
 
@@ -359,8 +356,7 @@ def claimer(database: Database, job_id: str) -> int:
     """The number of the process that has the job, once one has."""
 
     def look() -> str | None:
-        with database.reading() as connection:
-            job = jobs.get(connection, job_id)
+        job = read_from(database, jobs.get, job_id)
         return None if job is None else job.claimed_by
 
     return int((until(look) or "").split(":")[1])

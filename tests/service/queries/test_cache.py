@@ -27,7 +27,7 @@ from storage import clutches
 from storage.engine.database import Database
 from storage.engine.errors import StorageUnavailable
 from storage.engine.opening import open_database
-from tests.storage.samples import clutch_row
+from tests.storage.samples import clutch_row, write_to
 
 
 @pytest.fixture(autouse=True)
@@ -151,8 +151,7 @@ def test_of_several_services_on_a_server_one_computes(on_server: Database) -> No
         computed.append(clutch_id)
         return {"computed": len(computed), "arguments": len(arguments)}
 
-    with on_server.writing() as connection:
-        clutches.insert(connection, clutch_row("c1"))
+    write_to(on_server, clutches.insert, clutch_row("c1"))
     with closing(open_database(on_server.url)) as other:
         assert shared_answer(other, count, "c1") is None
         first = revision_and_json(on_server, count, "c1", ())
@@ -173,8 +172,7 @@ def test_another_build_of_the_release_computes_for_itself(on_server: Database, m
     def query(_: Database, clutch_id: str) -> dict[str, str]:
         return {"clutch_id": clutch_id, "computed_by": caches.BUILD}
 
-    with on_server.writing() as connection:
-        clutches.insert(connection, clutch_row("c1"))
+    write_to(on_server, clutches.insert, clutch_row("c1"))
     _, first = revision_and_json(on_server, query, "c1", ())
     monkeypatch.setattr(caches, "BUILD", f"{CODE_VERSION}+other")
     assert shared_answer(on_server, query, "c1") is None

@@ -26,7 +26,7 @@ from storage.engine.database import Database
 from storage.engine.opening import open_database
 from tests.growth import peak
 from tests.service.clients import client_on, clutchlife
-from tests.storage.samples import clutch_row, new_run
+from tests.storage.samples import clutch_row, new_run, read_from, write_to
 from tests.support import stationary
 
 SAMPLES = 20_000
@@ -59,8 +59,7 @@ def store(database: Database, columns: dict[str, FloatArray], run_id: str) -> No
 @pytest.fixture
 def database(tmp_path: Path) -> Iterator[Database]:
     found = open_database(f"sqlite:///{tmp_path / 'clutchlife.db'}")
-    with found.writing() as connection:
-        clutches.insert(connection, clutch_row())
+    write_to(found, clutches.insert, clutch_row())
     store(found, dynamic(), "raw")
     plateaus = {name: np.array(values) for name, values in stationary(0)["channels"].items()}
     store(found, plateaus, "plateaus")
@@ -78,9 +77,7 @@ def written(database: Database, path: Path, run_id: str = "raw", points: int | N
 
 def test_all_samples_bit_for_bit_behind_the_receipt_as_json_and_as_parquet(database: Database, tmp_path: Path) -> None:
     body = json.loads(written(database, tmp_path / "body"))
-    with database.reading() as connection:
-        row = runs.get(connection, CLUTCH, "raw")
-    assert row is not None
+    row = read_from(database, runs.get, CLUTCH, "raw")
     assert row.receipt.items() <= body.items()
     assert body.keys() - row.receipt.keys() == {
         "channels", "samples", "changes", "doubts", "reading", "received_by", "sent_cycles", "state",
@@ -136,7 +133,6 @@ def test_the_tag_follows_from_receipt_and_request_alone(database: Database, monk
     assert tags() == before
     with database.writing() as connection:
         row = runs.get(connection, CLUTCH, "raw")
-        assert row is not None
         runs.set_receipt(connection, row.run_key, row.receipt | {"cycles": 7})
     assert not {*tags()} & {*before}
     with pytest.raises(NotFoundError):

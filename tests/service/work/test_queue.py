@@ -16,6 +16,7 @@ from storage import jobs
 from storage.engine.database import Database
 from storage.jobs import JobRow
 from tests.service.work.waiting import until
+from tests.storage.samples import read_from, write_to
 
 ADDRESS = "postgresql+psycopg://u:s3cr3t@host/db"
 AT = "2026-11-02T10:00:00+00:00"
@@ -46,13 +47,11 @@ def test_no_argument_shows_the_address_of_the_database(monkeypatch: pytest.Monke
 def ask(database: Database, job_id: str, kind: str) -> None:
     arguments = {"request": ""}
     new = JobRow(job_id=job_id, kind=kind, clutch_id=None, asked_at=AT, asked_by="local", arguments=arguments)
-    with database.writing() as connection:
-        jobs.insert(connection, new)
+    write_to(database, jobs.insert, new)
 
 
 def states(database: Database) -> dict[str, str]:
-    with database.reading() as connection:
-        return {row.job_id: row.state for row in jobs.page(connection, limit=9)}
+    return {row.job_id: row.state for row in read_from(database, jobs.page, limit=9)}
 
 
 def finish_of(database: Database) -> Callable[[JobRow, Mapping[str, Any]], None]:
@@ -61,8 +60,7 @@ def finish_of(database: Database) -> Callable[[JobRow, Mapping[str, Any]], None]
     def finish(job: JobRow, ended: Mapping[str, Any]) -> None:
         problem = ended.get("problem")
         state = jobs.FINISHED if problem is None else jobs.FAILED
-        with database.writing() as connection:
-            jobs.end(connection, job.job_id, state, AT, problem=problem, claimer=job.claimed_by)
+        write_to(database, jobs.end, job.job_id, state, AT, problem=problem, claimer=job.claimed_by)
 
     return finish
 
@@ -92,8 +90,7 @@ def test_of_a_group_one_is_done_at_a_time_and_other_groups_do_not_wait(
     with started(in_file, *groups) as queue:
         until(lambda: states(in_file) == {"r": "running", "f": "waiting", "d": "failed", "other": "waiting"})
         assert queue.is_working()
-        with in_file.writing() as connection:
-            assert jobs.end(connection, "r", jobs.CANCELLED, AT)
+        assert write_to(in_file, jobs.end, "r", jobs.CANCELLED, AT)
         until(lambda: states(in_file) == {"r": "cancelled", "f": "running", "d": "failed", "other": "waiting"})
     assert not queue.is_working()
     assert states(in_file) == {"r": "cancelled", "f": "waiting", "d": "failed", "other": "waiting"}, "given back"
@@ -143,9 +140,7 @@ def test_a_job_that_fails_in_any_way_is_marked_failed_and_the_next_one_runs(
     with started(in_file, {jobs.REPLAY: Kind(work, finish)}) as queue:
         until(lambda: states(in_file) == {"bad": "failed", "next": "finished"})
         assert queue.is_working()
-    with in_file.reading() as connection:
-        row = jobs.get(connection, "bad")
-    assert row is not None
+    row = read_from(in_file, jobs.get, "bad")
     assert row.problem
     if how == "dies":
         assert "stopped (SIGKILL)" in row.problem, "it wrote nothing: the log has nothing of it"

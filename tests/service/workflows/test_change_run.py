@@ -34,6 +34,7 @@ from tests.service.workflows.benches import (
     send_to,
     stood_in,
 )
+from tests.storage.samples import read_from, write_to
 from tests.support import one_quick
 
 
@@ -237,9 +238,7 @@ def test_a_diagnosis_of_what_was_changed_meanwhile_is_stale_and_not_adopted(benc
         )
 
     asked_for, _ = ask()
-    with bench.database.writing() as connection:
-        job = jobs.claim(connection, "one", [jobs.DIAGNOSIS], lease=60.0, at=AT)
-    assert job is not None
+    job = write_to(bench.database, jobs.claim, "one", [jobs.DIAGNOSIS], lease=60.0, at=AT)
     bench.send(body("test", "odd", 1500.0, odd=True))  # held: the runs are the same
     assert ask() == (asked_for, False)
     apart, new = ask(isolability=True)  # the one that runs does not say it
@@ -252,8 +251,7 @@ def test_a_diagnosis_of_what_was_changed_meanwhile_is_stale_and_not_adopted(benc
     ended = {"report": {"verdict": "cause_named", "causes": []}, "extension": EXTENSION}
     finished = finish_and_adopt(bench.database, CLUTCH, asked_for, ended, at=AT, claimer="one")
     assert not finished
-    with bench.database.reading() as connection:
-        assert assumptions.current_adoption(connection, CLUTCH) is None
+    assert read_from(bench.database, assumptions.current_adoption, CLUTCH) is None
     assert bench.answers() == before
     run_diagnosis.finish(bench.database, job, ended, at=AT, adopt=lambda *_: pytest.fail("nobody wants it adopted"))
     stale = diagnosis_query.diagnosis(bench.database, CLUTCH, asked_for)
@@ -262,10 +260,7 @@ def test_a_diagnosis_of_what_was_changed_meanwhile_is_stale_and_not_adopted(benc
 
 
 def revision_of(bench: Bench) -> int:
-    with bench.database.reading() as connection:
-        found = clutches.revision(connection, CLUTCH)
-    assert found is not None
-    return found
+    return read_from(bench.database, clutches.revision, CLUTCH)
 
 
 def trail_of(bench: Bench) -> list[dict[str, Any]]:

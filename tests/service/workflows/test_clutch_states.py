@@ -15,6 +15,7 @@ from storage.clutches import Choice
 from storage.diagnoses import FINISHED
 from tests.service.work.replaying import replay_clutch
 from tests.service.workflows.benches import AT, CLUTCH, EXTENSION, WHO, Bench, body
+from tests.storage.samples import read_from, write_to
 from tests.support import one_quick
 
 #: Sequences, the tests that each begins with, and its writes: with them all states are met, and each kind of write.
@@ -62,8 +63,7 @@ class Written:
         """A diagnosis that was asked for before the writes to come, or now, and ends now."""
         database = self.bench.database
         run_diagnosis.ask(database, CLUTCH, by="local", adopt=False, request="", most=1, created_at=AT)
-        with database.writing() as connection:
-            job = jobs.claim(connection, "one", [jobs.DIAGNOSIS], lease=60.0, at=AT)
+        job = write_to(database, jobs.claim, "one", [jobs.DIAGNOSIS], lease=60.0, at=AT)
         assert job is not None
         report = {"verdict": self.one_of(VERDICTS), "causes": []}
         ended = {"report": report, "extension": EXTENSION}
@@ -72,8 +72,7 @@ class Written:
         run_diagnosis.finish(database, job, ended, at=AT, adopt=lambda *_: False)
 
     def adopt(self) -> None:
-        with self.bench.database.reading() as connection:
-            rows = diagnoses.page(connection, CLUTCH, limit=9)
+        rows = read_from(self.bench.database, diagnoses.page, CLUTCH, limit=9)
         for row in rows:
             if row.status == FINISHED and row.life == self.rows()[0].summary.get("life", ""):
                 self.bench.adopt(row.diagnosis_id)
@@ -107,8 +106,7 @@ class Written:
         edit(self.bench.database, CLUTCH, {"end_of_life": end}, archived=None, reason="another limit", **WHO)
 
     def rows(self) -> list[clutches.ClutchRow]:
-        with self.bench.database.reading() as connection:
-            return clutches.page(connection, limit=2)
+        return read_from(self.bench.database, clutches.page, limit=2)
 
 
 def stated_anew(bench: Bench) -> str:

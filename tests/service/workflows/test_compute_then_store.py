@@ -32,6 +32,7 @@ from storage.engine.errors import DamagedData
 from storage.engine.sqlite.database import FileDatabase
 from tests.service.work.replaying import InThread, replay_clutch
 from tests.service.workflows.benches import AT, CLUTCH, EXTENSION, REPORT, Bench, body, overtaken, send_to
+from tests.storage.samples import read_from
 
 
 def stored(database: Database) -> list[Any]:
@@ -107,8 +108,7 @@ def test_a_run_that_comes_while_another_is_computed_counts_for_it(
     overtaken_by.send_tests(2000)
     assert len(calls) == 3  # its own twice, the other's once
     assert stored(overtaken_by.database) == stored(calm.database)
-    with overtaken_by.database.reading() as connection:
-        assert clutches.revision(connection, CLUTCH) == 3
+    assert read_from(overtaken_by.database, clutches.revision, CLUTCH) == 3
 
 
 def test_a_replay_beside_a_rig_that_never_rests_ends_and_says_why(
@@ -173,7 +173,6 @@ def test_an_adoption_that_is_asked_for_twice_at_once_makes_one_version(
     assert len(calls) == 3  # its own twice, the other's once
     with bench.database.reading() as connection:
         row = assumptions.current_adoption(connection, CLUTCH)
-        assert row is not None
         assert row.version == 1
         assert clutches.revision(connection, CLUTCH) == 2
 
@@ -217,8 +216,7 @@ def test_a_run_that_another_process_stores_after_it_was_not_found_is_a_repeat(
     calls = overtaken(monkeypatch, runs, "get", bench.database, store, at=2)
     receipt, new = ingest(bench.database, CLUTCH, oil_change(), received_at=AT)
     assert (receipt["duplicate"], new, calls[:2]) == (True, False, [None, None])
-    with bench.database.reading() as connection:
-        assert clutches.revision(connection, CLUTCH) == 1
+    assert read_from(bench.database, clutches.revision, CLUTCH) == 1
 
 
 @pytest.mark.parametrize("whole", [True, False])
@@ -226,8 +224,7 @@ def test_a_stored_run_is_read_with_its_channels_and_described_without(bench: Ben
     """What was loaded whole goes to another process, which has no database."""
     sent = body("test", "r0", 0.0)
     bench.send(sent)
-    with bench.database.reading() as connection:
-        state = records.state(connection, CLUTCH)
+    state = read_from(bench.database, records.state, CLUTCH)
     recorded = stored_runs.recorded(bench.database, state, whole=whole)
     if whole:
         recorded = pickle.loads(pickle.dumps(recorded))  # noqa: S301 - its own

@@ -31,6 +31,7 @@ from storage.engine.database import Database
 from storage.engine.opening import open_database
 from tests.service.clients import client_on, post_run
 from tests.service.work.replaying import AT, InThread, replay_clutch, stock
+from tests.storage.samples import read_from, write_to
 from tests.support import stationary
 
 LIFE = "/v1/clutches/{}/remaining-useful-life"
@@ -171,13 +172,10 @@ def test_an_end_has_its_own_kind_learn_and_goes_before_the_rest_of_another(
         ingest(in_file, clutch_id, read_run(to_json(end)), received_at=AT)
 
     def do_next() -> tuple[dict[str, int], dict[str, str]]:
-        with in_file.writing() as connection:
-            job = jobs.claim(connection, "here", [jobs.FLEET_REFRESH], lease=60.0, at=AT)
-        assert job is not None
+        job = write_to(in_file, jobs.claim, "here", [jobs.FLEET_REFRESH], lease=60.0, at=AT)
         task = Task(**workflow_work("f")(job, Settings()).task)
         done = learn_fleet.as_job(in_file, task, say=lambda _: None, executor=InThread())
-        with in_file.writing() as connection:
-            jobs.end(connection, job.job_id, jobs.FINISHED, AT)
+        write_to(in_file, jobs.end, job.job_id, jobs.FINISHED, AT)
         return done
 
     declare("c3")
@@ -192,8 +190,7 @@ def test_an_end_has_its_own_kind_learn_and_goes_before_the_rest_of_another(
     assert taught[4:] == ["other"]
     assert do_next() == ({"kinds": 0, "changed": 3}, {})
     assert len(taught) == 5
-    with in_file.reading() as connection:
-        assert jobs.open_of(connection, jobs.FLEET_REFRESH) == []
+    assert read_from(in_file, jobs.open_of, jobs.FLEET_REFRESH) == []
 
 
 @pytest.mark.slow
@@ -250,11 +247,9 @@ def test_a_run_that_comes_before_its_clutch_is_brought_up_is_tracked_under_the_p
         assert "new" in refresh(url).changed
         assert life(client, "new")["prior"]["name"] == "fleet"
     with closing(open_database(url)) as database:
-        with database.reading() as connection:
-            before = records.answers(connection, "new")
+        before = read_from(database, records.answers, "new")
         replay_clutch(database, "new")
-        with database.reading() as connection:
-            assert records.answers(connection, "new") == before
+        assert read_from(database, records.answers, "new") == before
 
 
 @pytest.mark.slow

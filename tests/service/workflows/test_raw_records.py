@@ -19,7 +19,7 @@ from storage.engine.errors import DamagedData, DatabaseBusy, RawStoreUnavailable
 from storage.engine.opening import open_database
 from storage.tables import channel
 from tests.journeys.faults.test_kills import killed_after
-from tests.storage.samples import clutch_row, columns, new_run
+from tests.storage.samples import clutch_row, columns, new_run, read_from
 
 LENGTH = 20_000
 GRACE = 3600.0
@@ -93,8 +93,7 @@ def test_a_run_whose_blobs_are_removed_meanwhile_is_refused_not_lost(database: D
     assert collect(database, later=2 * GRACE).removed == 3
     with pytest.raises(DatabaseBusy, match="try again"):
         name(database, 1, again)
-    with database.reading() as connection:
-        assert runs.count(connection) == 0
+    assert read_from(database, runs.count) == 0
     assert all_there(database, store(database, 1))  # sent again, put again
 
 
@@ -127,8 +126,7 @@ def test_columns_move_between_places_and_back_bit_for_bit(database: Database, in
     for place, moved in ((in_folder, 2), (in_bucket, 6), (DATABASE, 6)):
         assert raw_records.move(database, place, tell=lambda _: None) == moved
         assert all_there(database, keys)
-        with database.reading() as connection:
-            assert raw_stores.numbers(connection) == ({} if place == DATABASE else {place: (6, 6)})
+        assert read_from(database, raw_stores.numbers) == ({} if place == DATABASE else {place: (6, 6)})
         assert raw_records.move(database, place, tell=lambda _: None) == 0
     found = raw_records.collect(database, grace=GRACE, now=time.time() + 2 * GRACE)
     assert [(each.address, each.removed) for each in found] == [(in_folder, 6), (in_bucket, 6)]
@@ -169,8 +167,7 @@ def test_a_start_that_is_cut_off_between_row_and_mark_can_be_repeated(
     raw_records.use(database, in_folder)
     assert all_there(database, store(database, 1))
     raw_records.use(database, DATABASE)
-    with database.reading() as connection:
-        assert raw_stores.in_use(connection) is None
+    assert read_from(database, raw_stores.in_use) is None
 
 
 def test_a_store_that_was_copied_is_found_at_its_new_address(
@@ -208,8 +205,7 @@ def test_kills_between_blob_and_row_lose_no_run_and_leave_only_what_is_collected
     longest = time.perf_counter() - begin
     ended = [killed_after(longest * number / 8, lambda number=number: ingest(2 + number)) for number in range(12)]
     with closing(open_database(url)) as again:
-        with again.reading() as connection:
-            known = runs.keys(connection, "bench3-017")
+        known = read_from(again, runs.keys, "bench3-017")
         keys |= {number: known[f"run-{number:04d}"] for number in range(1, 14) if f"run-{number:04d}" in known}
         assert all(2 + number in keys for number, whole in enumerate(ended) if whole)
         assert all_there(again, keys)

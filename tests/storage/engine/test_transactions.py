@@ -11,13 +11,17 @@ from storage import channels, clutches, runs
 from storage.engine.database import Database
 from storage.engine.errors import DatabaseBusy, StorageUnavailable
 from storage.engine.opening import open_database
-from tests.storage.samples import CLUTCH, clutch_row, store_run
+from tests.storage.samples import CLUTCH, clutch_row, read_from, store_run, write_to
+
+
+@pytest.fixture
+def database(database: Database) -> Database:
+    """One with a clutch."""
+    write_to(database, clutches.insert, clutch_row())
+    return database
 
 
 def test_a_failed_statement_rolls_back_what_came_before(database: Database) -> None:
-    with database.writing() as connection:
-        clutches.insert(connection, clutch_row())
-
     def fail() -> None:
         with database.writing() as connection:
             store_run(connection, 0)
@@ -31,21 +35,17 @@ def test_a_failed_statement_rolls_back_what_came_before(database: Database) -> N
 
 
 def test_threads_take_turns_and_readers_never_see_half_a_run(database: Database) -> None:
-    with database.writing() as connection:
-        clutches.insert(connection, clutch_row())
     done = threading.Event()
 
     def write(first: int) -> None:
         for number in range(first, first + 25):
-            with database.writing() as connection:
-                store_run(connection, number)
+            write_to(database, store_run, number)
 
     def read() -> int:
         looks = 0
         while not done.is_set():
             with database.reading() as connection:
                 clutch = clutches.get(connection, CLUTCH)
-                assert clutch is not None
                 keys = [row.run_key for row in runs.in_order(connection, CLUTCH)]
                 assert clutch.revision == len(keys)
                 assert all(len(channels.values_of(channels.stored_of_run(connection, key))) == 3 for key in keys[-3:])
@@ -62,8 +62,7 @@ def test_threads_take_turns_and_readers_never_see_half_a_run(database: Database)
         finally:
             done.set()
         assert all(each.result() > 0 for each in readers)
-    with database.reading() as connection:
-        assert len(runs.in_order(connection, CLUTCH)) == 100
+    assert len(read_from(database, runs.in_order, CLUTCH)) == 100
 
 
 def test_the_version_changes_with_every_commit_and_with_nothing_else(database: Database) -> None:
@@ -88,8 +87,6 @@ def test_the_version_changes_with_every_commit_and_with_nothing_else(database: D
 
 
 def test_a_reader_keeps_the_state_of_its_first_statement(database: Database) -> None:
-    with database.writing() as connection:
-        clutches.insert(connection, clutch_row())
     with database.reading() as reader:
         assert runs.in_order(reader, CLUTCH) == []
         with database.writing() as connection:
@@ -103,12 +100,9 @@ def test_a_reader_keeps_the_state_of_its_first_statement(database: Database) -> 
 
 def test_a_second_writer_gives_up_in_time(database: Database) -> None:
     with contextlib.closing(open_database(database.url, lock_timeout=0.1)) as impatient:
-        with database.writing() as connection:
-            clutches.insert(connection, clutch_row())
-            with pytest.raises(DatabaseBusy), impatient.writing():
-                pytest.fail("two writers at once")
-        with impatient.writing() as connection:
-            assert clutches.all_ids(connection) == [CLUTCH]
+        with database.writing(), pytest.raises(DatabaseBusy), impatient.writing():
+            pytest.fail("two writers at once")
+        assert write_to(impatient, clutches.all_ids) == [CLUTCH]
 
 
 def test_a_closed_database_says_so(database: Database) -> None:

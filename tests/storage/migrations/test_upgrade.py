@@ -17,7 +17,17 @@ from storage.engine.errors import DatabaseTooNew, StorageUnavailable
 from storage.engine.opening import open_database
 from storage.migrations import upgrade as migrations
 from storage.tables import metadata
-from tests.storage.samples import CLUTCH, OLD, child, clutch_row, integrity, new_diagnosis, old_database, revision
+from tests.storage.samples import (
+    CLUTCH,
+    OLD,
+    child,
+    clutch_row,
+    integrity,
+    new_diagnosis,
+    old_database,
+    revision,
+    write_to,
+)
 
 
 @pytest.fixture
@@ -63,8 +73,7 @@ def test_keys_of_the_migrated_tables_are_those_of_the_metadata(database: Databas
 
 
 def test_a_second_start_changes_nothing(database: Database) -> None:
-    with database.writing() as connection:
-        clutches.insert(connection, clutch_row())
+    write_to(database, clutches.insert, clutch_row())
     before = database.path.read_bytes()
     with closing(open_database(f"sqlite:///{database.path}")) as again, again.reading() as connection:
         assert clutches.get(connection, CLUTCH) == clutch_row()

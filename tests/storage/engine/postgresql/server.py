@@ -79,7 +79,6 @@ class PostgresServer:
         self._end(signal.SIGINT)
 
     def _end(self, how: signal.Signals) -> None:
-        assert self.process is not None
         self.process.send_signal(how)
         self.process.wait(60)
 

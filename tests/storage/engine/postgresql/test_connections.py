@@ -18,7 +18,7 @@ from storage.engine.opening import open_database
 from storage.engine.postgresql.connect import SERVICE_KEY, SingleStatements, migration_lock
 from storage.engine.postgresql.database import ServerWatch
 from tests.storage.engine.postgresql.server import postgresql_server
-from tests.storage.samples import clutch_row
+from tests.storage.samples import clutch_row, write_to
 
 ANSWER = SharedAnswer(clutch_id="c1", name="degradation", release="1.0", revision=0, body=b"kept")
 _HELD = text("""
@@ -78,7 +78,6 @@ def test_libpq_is_told_when_a_lost_machine_counts_as_gone_unless_the_address_say
     for url, told in ((on_server.url, ("60000", "30", "10")), (said, ("5000", "2", "1"))):
         with closing(open_database(url)) as opened, opened.reading() as connection:
             raw = connection.connection.dbapi_connection
-            assert raw is not None
             found = raw.info.get_parameters()
             assert tuple(found[f] for f in ("tcp_user_timeout", "keepalives_idle", "keepalives_interval")) == told
 
@@ -86,8 +85,7 @@ def test_libpq_is_told_when_a_lost_machine_counts_as_gone_unless_the_address_say
 def test_a_statement_finds_the_server_that_was_started_again() -> None:
     """Each on a connection of before, which the server has ended."""
     with postgresql_server() as server, closing(open_database(server.fresh())) as database:
-        with database.writing() as connection:
-            clutches.insert(connection, clutch_row("c1"))
+        write_to(database, clutches.insert, clutch_row("c1"))
         database.share(ANSWER)
 
         def snapshot() -> None:
@@ -233,8 +231,7 @@ def test_the_last_of_each_clutch_and_name_is_kept(on_server: Database) -> None:
 
 
 def test_a_database_of_before_gets_the_table_and_counts_its_commits_on(on_server: Database) -> None:
-    with on_server.writing() as connection:
-        clutches.insert(connection, clutch_row("c1"))
+    write_to(on_server, clutches.insert, clutch_row("c1"))
     with on_server.writing() as connection:
         connection.execute(text("DROP TABLE shared_answer"))
     counted = on_server.watch.snapshot().version

@@ -24,7 +24,7 @@ from storage.engine.opening import database_exists, find_database, open_database
 from storage.engine.postgresql import connect as server
 from storage.migrations.upgrade import current, head
 from tests.storage.engine.postgresql.server import PostgresServer, postgresql_server
-from tests.storage.samples import clutch_row, columns, store_run, take_back
+from tests.storage.samples import clutch_row, columns, read_from, store_run, take_back, write_to
 
 SECRET = "s3cr3t"  # noqa: S105 - a test's
 
@@ -120,8 +120,7 @@ def test_a_database_of_an_earlier_revision_is_not_migrated_under_a_service(datab
 def test_a_service_that_comes_late_to_a_migration_starts_beside_the_one_that_made_it(
     database: Database, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    with database.writing() as connection:
-        take_back(connection)
+    write_to(database, take_back)
     lock = server.migration_lock
     with ExitStack() as serving:
 
@@ -158,8 +157,7 @@ def test_writers_of_one_clutch_wait_for_each_other_and_those_of_others_do_not(da
                     pytest.fail("two writers of the same at once")
         with database.writing(), pytest.raises(DatabaseBusy), impatient.writing(of="a"):
             pytest.fail("beside one who writes of all")
-        with impatient.reading() as connection:
-            assert clutches.all_ids(connection) == ["b"]
+        assert read_from(impatient, clutches.all_ids) == ["b"]
 
 
 def test_who_reads_a_number_of_commits_sees_all_that_was_committed_up_to_it(database: Database) -> None:
@@ -218,20 +216,18 @@ def test_what_was_committed_is_there_after_the_server_was_killed() -> None:
     with postgresql_server() as server:
         url = server.fresh()
         with closing(open_database(url)) as database:
-            with database.writing() as connection:
-                clutches.insert(connection, clutch_row())
+            write_to(database, clutches.insert, clutch_row())
             before = database.watch.snapshot().version
             server.kill()
             for question in (database.watch.snapshot, lambda: open_database(url)):
                 with pytest.raises(StorageUnavailable):
                     question()
-            with pytest.raises(StorageUnavailable), database.writing() as connection:
+            with pytest.raises(StorageUnavailable), database.writing():
                 pytest.fail("written without a server")
             assert database.faults(least_free=0)["database"].startswith("the database cannot be read")
             server.start()
             assert database.watch.snapshot().version == before
-            with database.writing() as connection:
-                store_run(connection, 0)
+            write_to(database, store_run, 0)
             assert database.watch.snapshot().version == before + 1
             assert database.faults(least_free=0) == {}
 
@@ -247,8 +243,7 @@ def test_a_transaction_that_the_server_did_not_end_is_not_there() -> None:
         with pytest.raises(StorageUnavailable):
             write_and_lose_the_server()
         server.start()
-        with database.reading() as connection:
-            assert clutches.all_ids(connection) == []
+        assert read_from(database, clutches.all_ids) == []
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,7 @@ from storage.engine.opening import open_database
 from storage.engine.sqlite.backup import restore
 from storage.engine.sqlite.connect import service_lock
 from storage.engine.sqlite.database import back_up
-from tests.storage.samples import CLUTCH, OLD, clutch_row, integrity, old_database, revision, store_run
+from tests.storage.samples import CLUTCH, OLD, clutch_row, integrity, old_database, revision, store_run, write_to
 
 # --- A copy taken while others write is one state of the database, and never replaces a file.
 
@@ -39,8 +39,7 @@ def test_a_copy_while_the_service_writes_is_one_state(busy: Database, tmp_path: 
     def write() -> None:
         number = 1
         while not done.is_set() and number < 2000:
-            with busy.writing() as connection:
-                store_run(connection, number, length=2000)
+            write_to(busy, store_run, number, length=2000)
             written.append(number)
             number += 1
 
@@ -59,7 +58,6 @@ def test_a_copy_while_the_service_writes_is_one_state(busy: Database, tmp_path: 
         with closing(open_database(f"sqlite:///{copy}")) as restored, restored.reading() as connection:
             rows = runs.in_order(connection, CLUTCH)
             clutch = clutches.get(connection, CLUTCH)
-            assert clutch is not None
             assert clutch.revision == len(rows)
             assert all(len(channels.values_of(channels.stored_of_run(connection, row.run_key))) == 3 for row in rows)
 
@@ -106,8 +104,7 @@ def url(tmp_path: Path) -> str:
             clutches.insert(connection, clutch_row())
             store_run(connection, 0)
         back_up(address, tmp_path / "backup.db")
-        with database.writing() as connection:
-            store_run(connection, 1)
+        write_to(database, store_run, 1)
     return address
 
 
@@ -122,8 +119,6 @@ def test_a_restored_backup_is_in_place_and_the_replaced_file_is_kept(url: str, t
     kept = restore(url, backup)
     again = restore(url, backup)
     assert (kept, again) == (tmp_path / "a.db-replaced", tmp_path / "a.db-replaced.2")
-    assert kept is not None
-    assert again is not None
     assert [count(each) for each in (path, backup, kept, again)] == [1, 1, 2, 1]
 
 
@@ -136,7 +131,6 @@ def test_commits_that_are_only_in_the_log_are_kept_too(url: str, tmp_path: Path)
     os.waitpid(child, 0)
     assert (tmp_path / "a.db-wal").stat().st_size > 0
     kept = restore(url, tmp_path / "backup.db")
-    assert kept is not None
     assert [count(tmp_path / "a.db"), count(kept)] == [1, 3]
 
 
@@ -149,7 +143,6 @@ def test_a_lost_database_is_restored(url: str, tmp_path: Path) -> None:
 def test_a_damaged_database_is_replaced_and_kept_as_it_is(url: str, tmp_path: Path) -> None:
     (tmp_path / "a.db").write_bytes(b"no database at all" * 1000)
     kept = restore(url, tmp_path / "backup.db")
-    assert kept is not None
     assert kept.read_bytes() == b"no database at all" * 1000
     assert count(tmp_path / "a.db") == 1
 

@@ -21,7 +21,7 @@ from storage.engine.opening import find_database, open_database, service_lock
 from storage.engine.sqlite import connect
 from storage.engine.sqlite.backup import copy
 from storage.engine.sqlite.database import back_up
-from tests.storage.samples import CLUTCH, OLD, clutch_row, integrity, old_database, store_run
+from tests.storage.samples import CLUTCH, OLD, clutch_row, integrity, old_database, read_from, store_run, write_to
 from tests.support import one_quick
 
 # --- Address, journal mode and the settings of every connection.
@@ -99,8 +99,7 @@ def test_beside_a_rollback_journal_a_commit_waits_for_readers_gives_up_and_leave
 ) -> None:
     monkeypatch.setattr(connect, "JOURNAL_MODE", "delete")
     with closing(open_database(f"sqlite:///{tmp_path}/a.db", lock_timeout=0.1)) as impatient:
-        with impatient.writing() as connection:
-            clutches.insert(connection, clutch_row())
+        write_to(impatient, clutches.insert, clutch_row())
         with impatient.reading() as reader:
             assert runs.in_order(reader, CLUTCH) == []
             with pytest.raises(DatabaseBusy, match="locked"), impatient.writing() as connection:
@@ -121,29 +120,28 @@ def test_a_writer_elsewhere_makes_the_database_busy(tmp_path: Path, journal_mode
         other.execute("BEGIN IMMEDIATE")
         with pytest.raises(DatabaseBusy, match="locked"), impatient.writing():
             pytest.fail("two writers at once")
-        with impatient.reading() as connection:
-            assert clutches.all_ids(connection) == []
+        assert read_from(impatient, clutches.all_ids) == []
         other.execute("ROLLBACK")
-        with impatient.writing() as connection:
-            clutches.insert(connection, clutch_row())
+        write_to(impatient, clutches.insert, clutch_row())
 
 
 # --- Where the file cannot be used.
 
 
-def test_an_unreachable_file_is_named(tmp_path: Path) -> None:
-    for path in (tmp_path / "no such folder" / "a.db", tmp_path):
-        with pytest.raises(StorageUnavailable, match="cannot be opened") as failure:
-            open_database(f"sqlite:///{path}")
+def test_what_cannot_be_opened_is_named_and_left_alone(tmp_path: Path) -> None:
+    notes = tmp_path / "notes.txt"
+    notes.write_text("not a database, " * 100)
+    for opening, path, says in (
+        (open_database, tmp_path / "no such folder" / "a.db", "cannot be opened"),
+        (open_database, tmp_path, "cannot be opened"),
+        (open_database, notes, "is not a database"),
+        (find_database, tmp_path / "none.db", "cannot be opened"),
+    ):
+        with pytest.raises(StorageUnavailable, match=says) as failure:
+            opening(f"sqlite:///{path}")
         assert str(path) in str(failure.value)
-
-
-def test_a_file_that_is_no_database_is_left_alone(tmp_path: Path) -> None:
-    path = tmp_path / "notes.txt"
-    path.write_text("not a database, " * 100)
-    with pytest.raises(StorageUnavailable, match="is not a database"):
-        open_database(f"sqlite:///{path}")
-    assert path.read_text() == "not a database, " * 100
+    assert notes.read_text() == "not a database, " * 100
+    assert [each.name for each in tmp_path.iterdir()] == ["notes.txt"]
 
 
 def test_a_damaged_file_is_said_to_be_damaged(tmp_path: Path) -> None:
@@ -158,8 +156,7 @@ def test_a_damaged_file_is_said_to_be_damaged(tmp_path: Path) -> None:
 
 
 def test_a_full_disk_changes_nothing(database: Database) -> None:
-    with database.writing() as connection:
-        clutches.insert(connection, clutch_row())
+    write_to(database, clutches.insert, clutch_row())
 
     def overfill() -> None:
         with database.writing() as connection:
@@ -193,12 +190,6 @@ def test_a_found_database_is_read_at_its_own_revision_and_never_changed(tmp_path
         with pytest.raises(StorageUnavailable, match="read-only"), found.writing() as connection:
             connection.exec_driver_sql("DELETE FROM clutch")
     assert path.read_bytes() == before
-
-
-def test_nothing_is_found_where_there_is_no_file(tmp_path: Path) -> None:
-    with pytest.raises(StorageUnavailable, match="cannot be opened"):
-        find_database(f"sqlite:///{tmp_path}/none.db")
-    assert not (tmp_path / "none.db").exists()
 
 
 # --- Ready: the file is there, answers, has room and can be written; the question changes nothing.
@@ -301,20 +292,15 @@ def modes(folder: Path) -> dict[str, str]:
 
 
 @pytest.mark.usefixtures("_open_to_all")
-def test_other_users_read_no_file_of_a_new_database(tmp_path: Path) -> None:
+def test_other_users_read_no_file_of_a_new_database_but_a_mode_that_an_operator_chose_stays(tmp_path: Path) -> None:
     with service_lock(f"sqlite:///{tmp_path}/a.db"), closing(open_database(f"sqlite:///{tmp_path}/a.db")) as database:
-        with database.writing() as connection:
-            clutches.insert(connection, clutch_row())
+        write_to(database, clutches.insert, clutch_row())
         copy(tmp_path / "a.db", tmp_path / "backup.db", lock_timeout=1.0)
         found = modes(tmp_path)
     assert {"a.db", "a.db-wal", "a.db-shm", "a.db-lock", "a.db-service", "backup.db"} <= found.keys()
     assert set(found.values()) == {"0o600"}
     (tmp_path / "control").touch()
     assert modes(tmp_path)["control"] == "0o666", "the mask hides what is to be seen"
-
-
-def test_a_mode_that_an_operator_chose_stays(tmp_path: Path) -> None:
-    open_database(f"sqlite:///{tmp_path}/a.db").close()
     (tmp_path / "a.db").chmod(0o640)
     open_database(f"sqlite:///{tmp_path}/a.db").close()
     assert modes(tmp_path)["a.db"] == "0o640"

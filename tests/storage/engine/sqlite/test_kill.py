@@ -12,7 +12,7 @@ import pytest
 from storage import channels, clutches, runs
 from storage.engine.database import Database
 from storage.engine.opening import open_database
-from tests.storage.samples import CLUTCH, child, clutch_row, columns, integrity, store_run
+from tests.storage.samples import CLUTCH, child, clutch_row, columns, integrity, store_run, write_to
 from tests.support import one_quick
 
 #: Kills itself at a named moment of the second run's transaction.
@@ -80,7 +80,6 @@ def assert_whole(database: Database) -> int:
                 name: each.tobytes() for name, each in expected.items()
             }
         clutch = clutches.get(connection, CLUTCH)
-        assert clutch is not None
         assert clutch.revision == len(rows)
     return len(rows)
 
@@ -94,8 +93,7 @@ def test_killed_in_mid_transaction(path: Path, journal_mode: str, moment: str, l
         assert writer.wait(timeout=60) == -signal.SIGKILL
     with closing(open_database(f"sqlite:///{path}", lock_timeout=1.0)) as database:
         assert assert_whole(database) == 1
-        with database.writing() as connection:
-            store_run(connection, 1)
+        write_to(database, store_run, 1)
         assert assert_whole(database) == 2
     assert integrity(path) == ["ok"]
 
@@ -111,7 +109,6 @@ def test_killed_at_any_moment_what_was_committed_stays(path: Path, journal_mode:
     with closing(open_database(f"sqlite:///{path}", lock_timeout=1.0)) as database:
         stored = assert_whole(database)
         assert stored in {committed, committed + 1}  # killed between the commit and the word
-        with database.writing() as connection:
-            store_run(connection, stored)
+        write_to(database, store_run, stored)
         assert assert_whole(database) == stored + 1
     assert integrity(path) == ["ok"]

@@ -68,16 +68,17 @@ def test_who_does_not_get_it_in_time_is_told_and_a_kill_frees_it(tmp_path: Path)
     impatient = WriteLock(tmp_path / "a.db", 0.05)
     with pytest.raises(DatabaseBusy, match="another process"), impatient.held():
         pytest.fail("two writers at once")
-    assert other.pid is not None
     os.kill(other.pid, signal.SIGKILL)
     other.join(IN_TIME)
     with impatient.held():
         pass
 
 
-def test_a_lock_that_cannot_be_made_is_no_write(tmp_path: Path) -> None:
-    with pytest.raises(StorageUnavailable, match="lock"), WriteLock(tmp_path / "nowhere" / "a.db", 0.05).held():
-        pytest.fail("written without the lock")
+def test_where_no_lock_can_be_made_nothing_is_written_and_no_service_starts(tmp_path: Path) -> None:
+    path = tmp_path / "nowhere" / "a.db"
+    for lock, says in ((WriteLock(path, 0.05).held(), "lock"), (service_lock(path), "lock of the database")):
+        with pytest.raises(StorageUnavailable, match=says), lock:
+            pytest.fail("without the lock")
 
 
 def test_an_exception_inside_frees_it(tmp_path: Path) -> None:
@@ -131,11 +132,6 @@ def test_a_second_service_is_refused_until_the_first_has_ended_however_it_ends(t
         for _ in range(2):
             with service_lock(path):
                 pass
-
-
-def test_where_no_lock_can_be_made_no_service_starts(tmp_path: Path) -> None:
-    with pytest.raises(StorageUnavailable, match="lock of the database"), service_lock(tmp_path / "none" / "a.db"):
-        pass
 
 
 @pytest.mark.usefixtures("later_step")
