@@ -13,7 +13,7 @@ import time
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from functools import cached_property
+from functools import cached_property, partial
 from importlib import import_module
 from multiprocessing import forkserver
 from multiprocessing.process import BaseProcess
@@ -21,7 +21,7 @@ from multiprocessing.reduction import DupFd
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import SimpleNamespace
-from typing import IO, Any
+from typing import IO, Any, Literal
 
 import httpx2
 import numpy as np
@@ -74,6 +74,13 @@ def stationary(
         },
     }
     return body if run_id is None else body | {"run_id": run_id}
+
+
+def post_tests(client: httpx2.Client, *cycles: float, to: str = "c1", **measured: Any) -> None:
+    """Post stationary tests `r0`, `r1000`, ... of a clutch."""
+    for each in cycles:
+        answer = client.post(f"/v1/clutches/{to}/runs", json=stationary(each, run_id=f"r{each:g}", **measured))
+        assert answer.status_code == 201, answer.text
 
 
 #: Asks once what needs no client of its own. It loads the certificates once for all, gives a busy machine time, and keeps no
@@ -293,6 +300,23 @@ def serving(
     finally:
         if server.exit_code() is None:
             server.stop()
+
+
+def filled_service(
+    fill: Callable[[Server], object] | None = None, *, scope: Literal["function", "module"] = "module", engine: str = ""
+) -> Any:
+    """Makes of what fills a service the fixture of one that runs, for all of a module or for a test, with another engine."""
+    if fill is None:
+        return partial(filled_service, scope=scope, engine=engine)
+
+    @pytest.fixture(scope=scope)
+    def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+        path = tmp_path_factory.mktemp("served") / "clutchlife.db"
+        with serving(path, loaded=True, environment={"CLUTCHLIFE_ENGINE": engine} if engine else None) as server:
+            fill(server)
+            yield server
+
+    return running
 
 
 @contextmanager

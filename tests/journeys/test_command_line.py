@@ -99,7 +99,6 @@ def test_the_demo_shows_a_life_and_leaves_its_dashboard_open_up_to_date_with_fri
     """Until Ctrl-C; `--exit` ends by itself instead."""
     called = [sys.executable, "-u", "-m", "service.cli.main", "demo", "--no-browser"]
     with subprocess.Popen(called, stdout=subprocess.PIPE, text=True, start_new_session=True) as demo:
-        assert demo.stdout is not None
         output = ""
         try:
             for line in demo.stdout:

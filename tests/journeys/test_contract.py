@@ -2,13 +2,12 @@
 
 import csv
 import io
-from collections.abc import Iterator
 from typing import Any
 
 import httpx2
 import pytest
 
-from tests.service.clients import client_on
+from tests.service.clients import filled_client
 from tests.support import stationary
 
 CLUTCH = {
@@ -36,12 +35,10 @@ def post_life(http: httpx2.Client, last: int) -> list[dict[str, Any]]:
     return receipts
 
 
-@pytest.fixture(scope="module")
-def life(tmp_path_factory: pytest.TempPathFactory) -> Iterator[httpx2.Client]:
+@filled_client(scope="module")
+def life(client: httpx2.Client) -> None:
     """A clutch with eight tests, for what changes nothing of it."""
-    with client_on(f"sqlite:///{tmp_path_factory.mktemp('life')}/a.db") as client:
-        post_life(client, 7)
-        yield client
+    post_life(client, 7)
 
 
 def test_a_clutch_is_registered_once_and_nothing_is_predicted_before_its_first_run(http: httpx2.Client) -> None:

@@ -2,7 +2,6 @@
 address and in whole sequences of requests."""
 
 from collections import Counter
-from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -18,7 +17,7 @@ from schemathesis.core.failures import FailureGroup
 from schemathesis.schemas import APIOperation
 
 from tests.service.clients import described
-from tests.support import Server, serving, stationary
+from tests.support import Server, filled_service, post_tests, serving, stationary
 
 SCHEMA = schemathesis.openapi.from_dict(described())
 OPERATIONS = [operation.ok() for operation in SCHEMA.get_all_operations()]
@@ -26,14 +25,11 @@ OPERATIONS = [operation.ok() for operation in SCHEMA.get_all_operations()]
 EXCLUDED = [checks.positive_data_acceptance]
 
 
-@pytest.fixture(scope="module")
-def api(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+@filled_service
+def api(server: Server) -> None:
     """A service that knows one clutch with three tests."""
-    with serving(tmp_path_factory.mktemp("api") / "clutchlife.db", loaded=True) as server:
-        server.http.post("/v1/clutches", json={"clutch_id": "c1"})
-        for cycles in (0, 1000, 2000):
-            server.http.post("/v1/clutches/c1/runs", json=stationary(cycles, run_id=f"r{cycles}"))
-        yield server
+    server.http.post("/v1/clutches", json={"clutch_id": "c1"})
+    post_tests(server.http, 0, 1000, 2000)
 
 
 #: A diagnosis is asked for and not waited for.

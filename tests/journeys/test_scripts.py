@@ -48,8 +48,7 @@ def matlab(text: str) -> dict[str, Any]:
     """`struct('a', 1, 'b', [1 2])` as the JSON that MATLAB makes of it: rows are lists."""
     text = re.sub(r"\.\.\.\s*", "", text)
     text = re.sub(r"\[([\d. ]+)\]", lambda row: f"[{', '.join(row[1].split())}]", text)
-    made: dict[str, Any] = value(ast.parse(text, mode="eval").body)
-    return made
+    return value(ast.parse(text, mode="eval").body)
 
 
 def value(node: ast.expr) -> Any:
@@ -63,7 +62,6 @@ def test_the_recipe_for_matlab_is_understood(server: Server) -> None:
     """`webwrite` with this media type sends the struct as JSON; `webread` takes JSON and CSV."""
     code = block("matlab")
     run = re.search(r"run = (struct\(.*?\)\));", code, flags=re.DOTALL)
-    assert run is not None
     addresses = re.findall(r"\[url '([^']+)'\]", code)
     headers = {"Content-Type": "application/json", "Accept": "*/*", "User-Agent": "MATLAB 24.1.0.2537033 (R2024a)"}
     with httpx2.Client(base_url=server.url, headers=headers, timeout=60) as http:
@@ -80,8 +78,6 @@ def test_the_recipe_for_labview_is_understood(server: Server, tmp_path: Path) ->
     page = PAGE.read_text(encoding="utf-8")
     path = re.search(r"`(/v1/[^`]*/runs)`", page)
     file_address = re.search(r"`(/v1/[^`]*/runs/file[^`]*)`", page)
-    assert path is not None
-    assert file_address is not None
     body = block("json")
     csv = tmp_path / "run.csv"
     pd.DataFrame(json.loads(body)["channels"]).to_csv(csv, index=False)

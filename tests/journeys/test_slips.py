@@ -64,7 +64,6 @@ def test_slips_are_seen_and_mended_in_the_terminal(server: Server, tmp_path: Pat
     assert "c1: ended at 4,000 cycles (worn)" in ended
     assert "ended at 4,000 cycles" in clutchlife("life", "c1", *at)
     run = re.search(r"clutchlife withdraw c1 (\S+) --reason", ended)
-    assert run is not None
     assert "at 4000 cycles" in clutchlife("end", "c1", "--cycles", "5000", *at, code=65)
     assert "worn or other" in clutchlife("end", "c1", "--reason", "tired", *at, code=64)
     assert "withdrawn" in clutchlife("withdraw", "c1", run[1], "--reason", "it does not squeal", *at)

@@ -3,11 +3,12 @@
 import json
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, Literal
 
+import pytest
 from fastapi.testclient import TestClient
 from typer.testing import CliRunner
 
@@ -78,3 +79,18 @@ def client_of(path: Path, fill: Callable[[TestClient], object] = _as_it_is) -> I
     path.write_bytes(_laid(fill))
     with client_on(f"sqlite:///{path}") as client:
         yield client
+
+
+def filled_client(
+    fill: Callable[[TestClient], object] | None = None, *, scope: Literal["function", "module"] = "function"
+) -> Any:
+    """Makes of what fills a database with `c1` the fixture of a client on a copy of it, for a test or all of a module."""
+    if fill is None:
+        return partial(filled_client, scope=scope)
+
+    @pytest.fixture(scope=scope)
+    def found(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
+        with client_of(tmp_path_factory.mktemp("filled") / "a.db", fill) as client:
+            yield client
+
+    return found

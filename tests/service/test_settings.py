@@ -11,11 +11,6 @@ import pytest
 from service.settings import PREFIX, Settings, redacted
 
 
-def test_what_is_given_wins(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("CLUTCHLIFE_DATABASE", "sqlite:///other.db")
-    assert Settings.from_environment(database="sqlite:///own.db").database == "sqlite:///own.db"
-
-
 @pytest.mark.parametrize(
     "given",
     [
@@ -108,8 +103,9 @@ VARIABLES = {
 
 
 @pytest.mark.parametrize("name", VARIABLES)
-def test_every_limit_is_set_by_its_variable(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_every_limit_is_set_by_its_variable_unless_it_is_given(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     text, attribute, value = VARIABLES[name]
     assert getattr(Settings.from_environment(), attribute) != value
     monkeypatch.setenv(name, text)
     assert getattr(Settings.from_environment(), attribute) == value
+    assert Settings.from_environment(database="sqlite:///own.db").database == "sqlite:///own.db"

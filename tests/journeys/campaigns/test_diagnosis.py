@@ -8,21 +8,16 @@ import httpx2
 import pytest
 
 from tests.service.work.replaying import ended, processes, until_none
-from tests.support import Server, clutchlife, serving, stationary
+from tests.support import Server, clutchlife, post_tests, serving
 
 BASE = "/v1/clutches/c1"
-
-
-def post_tests(http: httpx2.Client, *cycles: float) -> None:
-    http.post("/v1/clutches", json={"clutch_id": "c1"})
-    for count in cycles:
-        assert http.post(f"{BASE}/runs", json=stationary(count, run_id=f"r{count:g}")).status_code == 201
 
 
 @pytest.mark.slow
 def test_a_diagnosis_whose_service_is_killed_is_made_by_the_next(tmp_path: Path) -> None:
     server = Server(tmp_path / "clutchlife.db")
     server.start()
+    server.http.post("/v1/clutches", json={"clutch_id": "c1"})
     post_tests(server.http, 0, 1000, 2000, 3000)
     answer = server.http.post(f"{BASE}/diagnoses", json={"adopt": True}, headers={"Prefer": "wait=0"})
     assert (answer.status_code, answer.json()["status"]) == (202, "running")
@@ -45,6 +40,7 @@ def test_a_diagnosis_whose_service_is_killed_is_made_by_the_next(tmp_path: Path)
 
 def test_a_stop_does_not_wait_for_a_diagnosis(tmp_path: Path) -> None:
     with serving(tmp_path / "clutchlife.db") as server, httpx2.Client(base_url=server.url, timeout=60) as http:
+        http.post("/v1/clutches", json={"clutch_id": "c1"})
         post_tests(http, 0, 1000, 2000)
         http.post(f"{BASE}/diagnoses", json={}, headers={"Prefer": "wait=0"})
         while not processes(server.address):
@@ -58,6 +54,7 @@ def test_a_stop_does_not_wait_for_a_diagnosis(tmp_path: Path) -> None:
 def test_the_commands_print_and_export_what_json_holds_for_a_script(tmp_path: Path) -> None:
     with serving(tmp_path / "clutchlife.db", loaded=True) as server:
         at = ("--url", server.url)
+        server.http.post("/v1/clutches", json={"clutch_id": "c1"})
         post_tests(server.http, 0, 1000, 2000, 3000)
         output = clutchlife("diagnose", "c1", *at)
         report = json.loads(clutchlife("diagnose", "c1", "--json", *at))

@@ -1,25 +1,20 @@
 """Alarms on the pages: a rule is made in a form, a posted run raises an alarm, somebody acknowledges it, and it stays so."""
 
-from collections.abc import Iterator
-
 import pytest
 from playwright.sync_api import expect
 
 from tests.browser.driving import Watched
 from tests.browser.lives import post
 from tests.journeys.dashboard.test_axe import violations
-from tests.support import Server, serving, stationary
+from tests.support import Server, filled_service, post_tests, stationary
 
 pytestmark = pytest.mark.browser
 
 
-@pytest.fixture(scope="module")
-def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    with serving(tmp_path_factory.mktemp("alarms") / "clutchlife.db", loaded=True) as running:
-        running.http.post("/v1/clutches", json={"clutch_id": "bench"}).raise_for_status()
-        for cycles in (0, 1000, 2000):
-            post(running.http, "bench", stationary(cycles, pressures=(5.0,)))
-        yield running
+@filled_service
+def server(running: Server) -> None:
+    running.http.post("/v1/clutches", json={"clutch_id": "bench"}).raise_for_status()
+    post_tests(running.http, 0, 1000, 2000, to="bench", pressures=(5.0,))
 
 
 def test_a_rule_is_made_an_alarm_raised_and_acknowledged(watched: Watched, server: Server) -> None:

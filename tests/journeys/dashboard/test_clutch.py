@@ -13,7 +13,7 @@ from playwright.sync_api import Browser, Locator, Page, expect
 from tests.browser.driving import Watched, pointed_at, turned
 from tests.browser.lives import demo, post
 from tests.browser.pixels import seen
-from tests.support import ONCE, Server, serving
+from tests.support import ONCE, Server, filled_service
 
 pytestmark = pytest.mark.browser
 
@@ -53,14 +53,12 @@ TAB_OF = {name: tab for tab, names in CHARTS.items() for name in names}
 MAX_OVERVIEW_PX, MAX_TOP_LINE_MS = 1700, 1000
 
 
-@pytest.fixture(scope="module")
-def life(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+@filled_service
+def life(server: Server) -> None:
     """The demo's life as sim-1, with an oil change beside what the simulation gives."""
-    with serving(tmp_path_factory.mktemp("life") / "clutchlife.db", loaded=True) as server:
-        clutch_id = demo(server.http)
-        note = "<img src=x onerror=alert(1)>"
-        post(server.http, clutch_id, {"kind": "maintenance", "cycles": 5000, "event": "oil_change", "note": note})
-        yield server
+    clutch_id = demo(server.http)
+    note = "<img src=x onerror=alert(1)>"
+    post(server.http, clutch_id, {"kind": "maintenance", "cycles": 5000, "event": "oil_change", "note": note})
 
 
 @pytest.fixture(scope="module")
@@ -128,7 +126,6 @@ def test_the_page_answers_first(browser: Browser, life: Server, size: tuple[int,
     assert said["headline"].partition(": ")[2] in headline
     assert page.locator("#action").inner_text() == said["action"]
     box = page.locator("#action").bounding_box()
-    assert box is not None
     assert box["y"] + box["height"] <= size[1]
     assert page.evaluate("document.documentElement.scrollWidth") <= size[0]
     page.locator("#chart-shudder").scroll_into_view_if_needed()  # on a phone it begins below what is drawn ahead

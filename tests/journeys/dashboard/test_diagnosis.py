@@ -1,7 +1,5 @@
 """A diagnosis from the page: run, read, adopted after a question, taken back. The engine is a quick stand-in."""
 
-from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -10,24 +8,20 @@ from playwright.sync_api import Page, expect
 from tests.browser.driving import Watched, turned
 from tests.browser.lives import post, worn
 from tests.browser.pixels import seen
-from tests.support import Server, serving, stationary
+from tests.support import Server, filled_service, stationary
 
 pytestmark = pytest.mark.browser
 
 ENGINE = "tests.service.workflows.stand_in_engine:diagnose"
 
 
-@pytest.fixture
-def server(tmp_path: Path) -> Iterator[Server]:
-    environment = {"CLUTCHLIFE_ENGINE": ENGINE}
-    with serving(tmp_path / "clutchlife.db", loaded=True, environment=environment) as running:
-        worn(running.http, "bench", last=5000)
-        yield running
+@filled_service(scope="function", engine=ENGINE)
+def server(running: Server) -> None:
+    worn(running.http, "bench", last=5000)
 
 
 def told(server: Server, path: str) -> dict[str, Any]:
-    found: dict[str, Any] = server.http.get(f"/v1/clutches/bench{path}").json()
-    return found
+    return server.http.get(f"/v1/clutches/bench{path}").json()
 
 
 def test_a_diagnosis_is_run_adopted_and_taken_back(watched: Watched, server: Server) -> None:

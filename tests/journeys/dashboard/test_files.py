@@ -13,7 +13,6 @@ from tests.support import Server
 
 def test_the_plotting_library_goes_out_compressed(server: Server) -> None:
     assets = re.search(r"/assets/[0-9a-f]+", server.http.get("/").text)
-    assert assets is not None
     name = f"{assets[0]}/plotly.min.js"
     with server.http.stream("GET", name, headers={"Accept-Encoding": "gzip"}) as answer:
         raw = b"".join(answer.iter_raw())

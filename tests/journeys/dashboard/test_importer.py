@@ -1,7 +1,6 @@
 """A rig's first file is described once on the page; its second is taken without a question."""
 
 import io
-from collections.abc import Iterator
 from typing import Any
 
 import openpyxl
@@ -11,23 +10,20 @@ from playwright.sync_api import Page, expect
 from tests.browser.driving import Watched, drop, turned
 from tests.journeys.dashboard.test_axe import violations
 from tests.service.web.test_import_preview import german
-from tests.support import ONCE, SPEEDS_RPM, Server, serving, stationary
+from tests.support import ONCE, SPEEDS_RPM, Server, filled_service, stationary
 
 pytestmark = pytest.mark.browser
 
 
-@pytest.fixture(scope="module")
-def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    with serving(tmp_path_factory.mktemp("importer") / "clutchlife.db", loaded=True) as running:
-        running.http.post("/v1/clutches", json={"clutch_id": "bench3-017"}).raise_for_status()
-        yield running
+@filled_service
+def server(running: Server) -> None:
+    running.http.post("/v1/clutches", json={"clutch_id": "bench3-017"}).raise_for_status()
 
 
 def workbook(cycles: int) -> bytes:
     """A German workbook with a title block and a row of units, its torque Mx."""
     book = openpyxl.Workbook()
     sheet = book.active
-    assert sheet is not None
     for line in german(cycles, torque="Mx").decode("latin-1").splitlines():
         cells = [cell.replace(",", ".") for cell in line.split(";")]
         sheet.append([float(cell) if cell.replace(".", "").isdigit() else cell for cell in cells])

@@ -1,6 +1,5 @@
 """Inspections on a clutch's page: R_a and R_sk over cycles, photographs by state, and a form that sends them."""
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -10,7 +9,7 @@ from tests.browser.driving import Watched
 from tests.browser.lives import worn
 from tests.journeys.dashboard.test_axe import violations
 from tests.service.web.routes.surfaces import FRESH, WORN, png
-from tests.support import Server, clutchlife, serving
+from tests.support import Server, clutchlife, filled_service, serving
 
 pytestmark = pytest.mark.browser
 
@@ -18,20 +17,18 @@ SMALL = {"width": 360, "height": 740}
 PICTURE = {"name": "worn.png", "mimeType": "image/png", "buffer": png(size=64)}
 
 
-@pytest.fixture(scope="module")
-def bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+@filled_service
+def bench(server: Server) -> None:
     """A clutch that was inspected fresh and worn, two photographs of the latter; a clutch that was never inspected."""
-    with serving(tmp_path_factory.mktemp("inspections") / "clutchlife.db", loaded=True) as server:
-        worn(server.http, "bench", last=2000)
-        for clutch_id in ("waiting", "sent"):
-            server.http.post("/v1/clutches", json={"clutch_id": clutch_id}).raise_for_status()
-        for body in (FRESH, FRESH | {"cycles": 4000, "roughness_um": 4.1, "skewness": -2.2}, WORN):
-            answer = server.http.post("/v1/clutches/bench/inspections", json=body).raise_for_status()
-        for red in (90, 160):
-            address = f"{answer.headers['location']}/photographs"
-            headers = {"Content-Type": "image/png"}
-            server.http.post(address, content=png(red, size=64), headers=headers).raise_for_status()
-        yield server
+    worn(server.http, "bench", last=2000)
+    for clutch_id in ("waiting", "sent"):
+        server.http.post("/v1/clutches", json={"clutch_id": clutch_id}).raise_for_status()
+    for body in (FRESH, FRESH | {"cycles": 4000, "roughness_um": 4.1, "skewness": -2.2}, WORN):
+        answer = server.http.post("/v1/clutches/bench/inspections", json=body).raise_for_status()
+    for red in (90, 160):
+        address = f"{answer.headers['location']}/photographs"
+        headers = {"Content-Type": "image/png"}
+        server.http.post(address, content=png(red, size=64), headers=headers).raise_for_status()
 
 
 def opened(browser: Browser, server: Server, clutch_id: str, **context: object) -> tuple[Watched, Page]:

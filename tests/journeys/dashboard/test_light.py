@@ -1,6 +1,5 @@
 """The charts are drawn light until someone points at one, and nothing moves when the plotting library takes their place."""
 
-from collections.abc import Iterator
 from typing import Any
 
 import pytest
@@ -9,7 +8,7 @@ from playwright.sync_api import Browser, Page, expect
 from tests.browser.driving import Watched, turned
 from tests.browser.lives import worn
 from tests.browser.pixels import seen
-from tests.support import Server, serving
+from tests.support import Server, filled_service
 
 pytestmark = pytest.mark.browser
 
@@ -34,11 +33,9 @@ async () => {
 _LIGHT = "circles => circles.map((c) => c.getBoundingClientRect()).map((r) => [r.x + r.width / 2, r.y + r.height / 2])"
 
 
-@pytest.fixture(scope="module")
-def life(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    with serving(tmp_path_factory.mktemp("light") / "clutchlife.db", loaded=True) as server:
-        worn(server.http, "bench", last=6000)
-        yield server
+@filled_service
+def life(server: Server) -> None:
+    worn(server.http, "bench", last=6000)
 
 
 def texts(page: Page, chart: str) -> list[str]:
@@ -72,7 +69,6 @@ def test_the_library_takes_the_place_of_the_light_drawing(
     assert len(points) >= 8
     page.evaluate(_FORGET)
 
-    assert box is not None
     if held:  # a chart in 3D is near the screen, and has asked for the library
         page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
     else:

@@ -9,7 +9,7 @@ from playwright.sync_api import Browser, Page, expect
 from tests.browser.driving import Watched, turned
 from tests.browser.lives import loops, post
 from tests.journeys.dashboard.test_axe import violations
-from tests.support import Server, serving, stationary
+from tests.support import Server, filled_service, post_tests
 
 pytestmark = pytest.mark.browser
 
@@ -17,24 +17,20 @@ PRESSURES = (4.0, 5.0, 6.0)
 CRITERIA = [{"quantity": "mean_cof"}, {"quantity": "slope", "pressure_bar": 5, "speed_rpm": 100}]
 
 
-@pytest.fixture(scope="module")
-def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+@filled_service
+def server(running: Server) -> None:
     """`bench` with two criteria, three stationary tests and two dynamic ones; `planned`, whose severity is its energy, 18 kJ
     a cycle, tested at four states and one pressure."""
-    with serving(tmp_path_factory.mktemp("quantities") / "clutchlife.db", loaded=True) as running:
-        record = {"clutch_id": "bench", "end_of_life": {"criteria": CRITERIA}}
-        running.http.post("/v1/clutches", json=record).raise_for_status()
-        for cycles in (0, 2000, 4000):
-            post(running.http, "bench", stationary(cycles, pressures=PRESSURES))
-        for cycles in (0, 4000):
-            post(running.http, "bench", loops(cycles, pressures=(4.0, 5.0)))
-        record = {"clutch_id": "planned", "severity": {"basis": "dissipated_energy"}}
-        running.http.post("/v1/clutches", json=record).raise_for_status()
-        for cycles in range(0, 4000, 1000):
-            post(running.http, "planned", stationary(cycles, pressures=(5.0,)))
-        duty = {"cycles": 3000, "energy_per_cycle_kj": 18}
-        post(running.http, "planned", {"kind": "duty_cycles", "cycles": 3000, "duty": duty})
-        yield running
+    record = {"clutch_id": "bench", "end_of_life": {"criteria": CRITERIA}}
+    running.http.post("/v1/clutches", json=record).raise_for_status()
+    post_tests(running.http, 0, 2000, 4000, to="bench", pressures=PRESSURES)
+    for cycles in (0, 4000):
+        post(running.http, "bench", loops(cycles, pressures=(4.0, 5.0)))
+    record = {"clutch_id": "planned", "severity": {"basis": "dissipated_energy"}}
+    running.http.post("/v1/clutches", json=record).raise_for_status()
+    post_tests(running.http, *range(0, 4000, 1000), to="planned", pressures=(5.0,))
+    duty = {"cycles": 3000, "energy_per_cycle_kj": 18}
+    post(running.http, "planned", {"kind": "duty_cycles", "cycles": 3000, "duty": duty})
 
 
 def asked(watched: Watched, text: str) -> int:

@@ -11,7 +11,7 @@ from tests.browser.driving import Watched, drop
 from tests.browser.lives import post
 from tests.browser.pixels import seen
 from tests.service.clients import csv_text
-from tests.support import Server, serving, stationary
+from tests.support import Server, filled_service, stationary
 
 pytestmark = pytest.mark.browser
 
@@ -20,14 +20,12 @@ WRONG = "pressure_bar,speed_rpm,torque_nm\n5,20,21\n5,120,abc\n5,520,21.5\n5,102
 REFUSED = ("404 (Not Found)", "422 (Unprocessable Entity)", "503 (Service Unavailable)")
 
 
-@pytest.fixture(scope="module")
-def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+@filled_service
+def server(running: Server) -> None:
     """A service with a clutch of one run, and another without."""
-    with serving(tmp_path_factory.mktemp("sending") / "clutchlife.db", loaded=True) as running:
-        for name in ("bench3-017", "other"):
-            running.http.post("/v1/clutches", json={"clutch_id": name}).raise_for_status()
-        post(running.http, "bench3-017", stationary(0, run_id="first"))
-        yield running
+    for name in ("bench3-017", "other"):
+        running.http.post("/v1/clutches", json={"clutch_id": name}).raise_for_status()
+    post(running.http, "bench3-017", stationary(0, run_id="first"))
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ import httpx2
 import numpy as np
 import pytest
 
-from tests.support import PRESSURES_BAR, SPEEDS_RPM, serving, stationary
+from tests.support import PRESSURES_BAR, SPEEDS_RPM, post_tests, serving, stationary
 
 BASE = "/v1/clutches/c1"
 
@@ -82,8 +82,7 @@ def test_a_first_test_without_a_mean_cof_sets_no_reference(http: httpx2.Client) 
         if name == "with":
             warnings = http.post(f"/v1/clutches/{name}/runs", json=mad).json()["warnings"]
             assert "no_mean_cof" in {warning["code"] for warning in warnings}
-        for cycles in (10, 1000, 2000, 3000):
-            assert http.post(f"/v1/clutches/{name}/runs", json=stationary(cycles)).status_code == 201
+        post_tests(http, 10, 1000, 2000, 3000, to=name)
         predictions[name] = http.get(f"/v1/clutches/{name}/remaining-useful-life?method=grid").json()
     for part, key in (("current", "mean_cof"), ("criterion", "initial_mean_cof")):
         assert predictions["with"][part][key] == pytest.approx(predictions["without"][part][key], rel=1e-2)
@@ -118,8 +117,7 @@ def test_a_missing_pressure_does_not_shift_the_mean(http: httpx2.Client) -> None
 
 def test_a_rebuild_starts_a_new_life(http: httpx2.Client) -> None:
     http.post("/v1/clutches", json={"clutch_id": "c1"})
-    for cycles in (0, 1000, 2000, 3000):
-        http.post(f"{BASE}/runs", json=stationary(cycles))
+    post_tests(http, 0, 1000, 2000, 3000)
     worn = without_revision(http)
     http.post(f"{BASE}/runs", json={"kind": "maintenance", "cycles": 3000, "event": "rebuild"})
     assert without_revision(http)["status"] == "insufficient_data"

@@ -1,7 +1,6 @@
 """Rules and events as a script uses them: raised once, acknowledged, cleared by the hysteresis; receivers learn of it."""
 
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -11,9 +10,9 @@ from service.alarms import outbox, rules
 from service.schemas.alarm import AlarmIn
 from service.workflows import change_alarms
 from tests.service.alarms.receiving import SECRET, Receiver, receiving, signed_rightly
-from tests.service.clients import client_of, post_run
+from tests.service.clients import filled_client, post_run
 from tests.service.work.waiting import until
-from tests.support import stationary
+from tests.support import post_tests, stationary
 
 CYCLES = (0.0, 1000.0, 2000.0, 3000.0)
 
@@ -24,17 +23,11 @@ def receiver() -> Iterator[Receiver]:
         yield made
 
 
-def fill(client: TestClient) -> None:
+@filled_client
+def life(client: TestClient) -> None:
     """A clutch `e` with as many tests as a prognosis needs."""
     assert client.post("/v1/clutches", json={"clutch_id": "e"}).status_code == 201
-    for cycles in CYCLES:
-        post_run(client, stationary(cycles), "e")
-
-
-@pytest.fixture
-def life(tmp_path: Path) -> Iterator[TestClient]:
-    with client_of(tmp_path / "clutchlife.db", fill) as found:
-        yield found
+    post_tests(client, *CYCLES, to="e")
 
 
 def rule(client: TestClient, **fields: Any) -> dict[str, Any]:

@@ -26,7 +26,7 @@ from service.client.clutchlife import Client
 from tests.service.clients import clutchlife, post_run
 from tests.service.web.routes.surfaces import png, sha256
 from tests.service.web.test_import_preview import german
-from tests.support import free_port, stationary
+from tests.support import free_port, post_tests, stationary
 
 Terminal = Callable[..., str]
 
@@ -282,8 +282,7 @@ def test_an_export_holds_what_counts_what_was_sent_inspections_and_photographs(
 
 
 def test_a_clutch_is_one_archive_with_its_tables(terminal: Terminal, client: TestClient, tmp_path: Path) -> None:
-    for cycles in (0.0, 1000.0, 2000.0, 3000.0):
-        post_run(client, stationary(cycles))
+    post_tests(client, 0.0, 1000.0, 2000.0, 3000.0)
     archive = tmp_path / "out" / "c1.zip"
     terminal("export", "c1", "--out", archive, "--archive")
     with zipfile.ZipFile(archive) as packed:

@@ -17,7 +17,7 @@ from service.schemas.base import MAX_TORQUE_FILTER_MS
 from tests.service.clients import client_on, post_run
 from tests.service.queries.test_scores import mean_torque
 from tests.service.workflows.test_learn_fleet import SPEEDS
-from tests.support import stationary
+from tests.support import post_tests, stationary
 
 HEAVY, LIGHT = 40.0, 10.0
 
@@ -120,8 +120,7 @@ def test_rebuilt_mean_cof_agrees_with_its_direct_track(client: TestClient) -> No
     assert before["warnings"] == []
     assert client.get("/v1/clutches/c1/surfaces").status_code == 404
     assert client.get("/v1/clutches/c1/degradation").json()["rebuilt"] is None
-    for i in range(8):
-        post_run(client, stationary(1000 * i, pressures=(4.0, 5.0, 6.0)))
+    post_tests(client, *range(0, 8000, 1000), pressures=(4.0, 5.0, 6.0))
     found = client.get("/v1/clutches/c1/degradation").json()
     direct, again = found["items"][0], found["rebuilt"]
     middle = again["trajectory"]["median"][0]
@@ -171,7 +170,6 @@ def life(exponent: float, steps: tuple[float, ...] = (10e3, 20e3, 40e3), seed: i
 def test_energy_that_steps_tells_its_exponent_and_doubts_another(exponent: float) -> None:
     """By cycles, whose exponent is 0, where wear goes with energy."""
     found = severity_estimate(life(exponent), Assumptions())
-    assert found is not None
     assert found.basis is SeverityBasis.DISSIPATED_ENERGY
     assert found.likeliest == exponent
     assert found.probability[SEVERITY_EXPONENTS.index(exponent)] > 0.5

@@ -226,6 +226,10 @@ def found(causes: list[str], advice: list[str] | None = None, *, adoptable: bool
             "Function check: 1 of the 3 tests that a prediction needs (6 more cannot be compared with the first); ",
             "Run 2 more stationary tests, at different cycles, with the pressures and oil of this life's first test: then",
         ),
+        (
+            {name: value for name, value in summary(0.0, status="reached").items() if name != "end_of_life_cycles"}, None,
+            "Failure: the end of life is reached", "",  # as it was stored without the end
+        ),
         ({}, None, "Function check: no run counts yet", "Run 3 more stationary tests, at different cycles: then "),
         (
             summary(9000.0), found(["oil_temperature"], adoptable=True),
@@ -282,12 +286,6 @@ def test_a_clutch_that_shudders_is_no_longer_normal(tmp_path: Path) -> None:
     assert states[1]["name"] in ("failure", "maintenance")
 
 
-def test_a_summary_that_was_stored_without_the_end_still_has_a_line() -> None:
-    stored = summary(0.0, status="reached")
-    del stored["end_of_life_cycles"]
-    assert top_line(stored, disputed=False)["headline"].startswith("Failure: the end of life is reached")
-
-
 def test_a_trajectory_goes_on_as_far_as_is_asked(bench: Bench) -> None:
     for cycles in (0.0, 1000.0, 2000.0):
         bench.send(body("test", f"t{cycles:g}", cycles))
@@ -297,16 +295,13 @@ def test_a_trajectory_goes_on_as_far_as_is_asked(bench: Bench) -> None:
         assert len(track["trajectory"]["median"]) == len(track["trajectory"]["cycles"])
 
 
-def test_lists_sort_by_the_bound_that_they_show_first() -> None:
+def test_lists_sort_by_the_bound_that_they_show_first_and_statements_say_that_held_runs_lower_it() -> None:
     """Sorted by the median, a clutch with 300 certain cycles stood below one with 4,000."""
     sure, unsure = (
         {"status": "predicted", "at_least": low, "remaining_cycles": {"0.5": median}, "with_held": held}
         for low, median, held in ((4000.0, 5000.0, None), (4500.0, 9000.0, {"particle": {"at_least": 300.0}}))
     )
     assert rank_of(unsure) == 300.0 < rank_of(sure) == 4000.0
-
-
-def test_a_statement_says_that_held_runs_lower_its_bound() -> None:
     for among, words in (
         (0.0, "no further cycle is safe, if held runs count"),
         (9500.0, "safe for 9,000 more cycles (95 %)"),

@@ -110,7 +110,6 @@ def test_a_filter_that_is_carried_on_says_what_one_that_starts_again_says(method
     for runs in range(1, len(CYCLES) + 1):
         carried = advance(method, series, carried, runs)
     again = advance(method, series, None, len(CYCLES))
-    assert carried is not None
     assert set(carried.states) == {"weak@0", "weak@1"}
     said = [predict(method, series, states, CYCLES[-1], 0.5, tests=of.tests) for states in (carried, again)]
     assert said[0] == said[1]

@@ -5,9 +5,8 @@ import math
 import pytest
 from fastapi.testclient import TestClient
 
-from tests.service.clients import post_run
 from tests.service.workflows.test_learn_fleet import SPEEDS
-from tests.support import stationary, torque_nm
+from tests.support import post_tests, torque_nm
 
 BASE = "/v1/clutches/c1"
 
@@ -20,8 +19,7 @@ def mean_torque(wear: float) -> float:
 
 
 def post_life(client: TestClient, last: int = 22_000) -> None:
-    for cycles in range(0, last + 1, 1000):
-        post_run(client, stationary(cycles, speeds=SPEEDS, pressures=(5.0,), noise=0.004))
+    post_tests(client, *range(0, last + 1, 1000), speeds=SPEEDS, pressures=(5.0,), noise=0.004)
 
 
 def test_a_life_that_has_not_ended_has_no_scores(client: TestClient) -> None:

@@ -186,6 +186,14 @@ def test_the_same_again_is_the_same_answer_or_304(polled: TestClient, routed: li
         assert "Content-Security-Policy" in seen.headers
         assert polled.head(address).headers["ETag"] == first.headers["ETag"]
     assert routed == []
+    line = 'clutchlife_requests_total{method="GET",route="/v1/clutches/{clutch_id}/runs",status="200"} '
+
+    def counted() -> float:
+        return float(polled.get("/metrics").text.partition(line)[2].partition("\n")[0])
+
+    before = counted()
+    assert polled.get("/v1/clutches/c1/runs").status_code == 200
+    assert counted() == before + 1, "by its route either way"
     for other, status in (("c1/runs?limits=1", 422), ("c1/runs?limit=0", 422), ("other/runs", 404)):
         assert polled.get(f"/v1/clutches/{other}").status_code == status
 
@@ -258,17 +266,6 @@ def polls_of(client: TestClient) -> Polls:
     while not isinstance(layer, Polls):
         layer = layer.app
     return layer
-
-
-def test_requests_are_counted_by_their_routes_either_way(polled: TestClient) -> None:
-    def counted() -> float:
-        line = 'clutchlife_requests_total{method="GET",route="/v1/clutches/{clutch_id}/runs",status="200"} '
-        text = polled.get("/metrics").text
-        return float(text.partition(line)[2].partition("\n")[0])
-
-    before = counted()
-    assert polled.get("/v1/clutches/c1/runs").status_code == 200
-    assert counted() == before + 1
 
 
 def test_a_database_that_cannot_be_read_is_said_to_be(polled: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -6,13 +6,10 @@ Answers are found in the API's description, so that new ones are asked as well.
 import csv
 import io
 import re
-from collections.abc import Iterator
-from pathlib import Path
 
-import pytest
 from fastapi.testclient import TestClient
 
-from tests.service.clients import client_of
+from tests.service.clients import filled_client
 from tests.support import stationary
 
 CLUTCH = "/v1/clutches/c1"
@@ -47,18 +44,13 @@ ANSWERS = (
 SAID = re.compile(r'"held(_runs)?":(2\b|2\.0\b|\{"count":2\b)|"(code|quantity)":"held_runs"|2 (runs are|held runs)')
 
 
-def fill(client: TestClient) -> None:
+@filled_client
+def held(client: TestClient) -> None:
     """A clutch with four tests that count and two that are held."""
     for cycles in (0.0, 1000.0, 2000.0, 3000.0):
         _sent(client, cycles, 1.0, "accepted")
     for cycles in (4000.0, 5000.0):
         _sent(client, cycles, 60.0, "held")
-
-
-@pytest.fixture
-def held(tmp_path: Path) -> Iterator[TestClient]:
-    with client_of(tmp_path / "a.db", fill) as client:
-        yield client
 
 
 def _sent(client: TestClient, cycles: float, gain: float, state: str) -> None:

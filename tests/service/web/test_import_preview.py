@@ -30,8 +30,7 @@ def preview(client: TestClient, content: bytes, profile: dict[str, Any] | None =
         files = {"file": (given["filename"], content)}
         answer = client.post(ADDRESS, params=given, data={"profile": json.dumps(profile)}, files=files)
     assert answer.status_code == 200, answer.text
-    shown: dict[str, Any] = answer.json()
-    return shown
+    return answer.json()
 
 
 def chosen(shown: dict[str, Any], title: str, **values: Any) -> dict[str, Any]:

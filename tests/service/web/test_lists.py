@@ -3,35 +3,29 @@ by what is searched for and by name, and counted, as far as a key sees them."""
 
 import csv
 import io
-from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
 
-from tests.service.clients import client_of, client_on
+from tests.service.clients import filled_client, post_run
 from tests.service.web.routes.granting import granted
 from tests.support import stationary
 
 BASE = "/v1/clutches/c1"
 
 
-@pytest.fixture(scope="module")
-def listed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
+@filled_client(scope="module")
+def listed(client: TestClient) -> None:
     """A clutch with five tests, one of them corrected twice, and a second clutch."""
-    with client_on(f"sqlite:///{tmp_path_factory.mktemp('lists')}/clutchlife.db") as found:
-        for clutch_id in ("c1", "c2"):
-            assert found.post("/v1/clutches", json={"clutch_id": clutch_id}).status_code == 201
-        for cycles in range(0, 5000, 1000):
-            body = stationary(cycles, run_id=f"s{cycles}", pressures=(4.0, 5.0))
-            assert found.post(f"{BASE}/runs", json=body).status_code == 201
-        for cycles in (4500, 4000):
-            body = {"cycles": cycles, "reason": "mistyped"}
-            assert found.patch(f"{BASE}/runs/s4000", json=body).status_code == 200
-        for cycles in (0, 3000):
-            assert found.post(f"{BASE}/inspections", json={"cycles": cycles, "note": "worn"}).status_code == 201
-        yield found
+    assert client.post("/v1/clutches", json={"clutch_id": "c2"}).status_code == 201
+    for cycles in range(0, 5000, 1000):
+        post_run(client, stationary(cycles, run_id=f"s{cycles}", pressures=(4.0, 5.0)))
+    for cycles in (4500, 4000):
+        body = {"cycles": cycles, "reason": "mistyped"}
+        assert client.patch(f"{BASE}/runs/s4000", json=body).status_code == 200
+    for cycles in (0, 3000):
+        assert client.post(f"{BASE}/inspections", json={"cycles": cycles, "note": "worn"}).status_code == 201
 
 
 def rows(text: str) -> list[dict[str, str]]:
@@ -86,21 +80,15 @@ def test_a_limit_is_refused_where_nothing_is_listed_and_a_cursor_that_is_none_ev
 # --- Lists of clutches.
 
 
-@pytest.fixture
-def fleet(tmp_path: Path) -> Iterator[TestClient]:
-    with client_of(tmp_path / "a.db", fill) as client:
-        yield client
-
-
-def fill(client: TestClient) -> None:
+@filled_client
+def fleet(client: TestClient) -> None:
     """c1, without a run; two that wear, one of them to its end and with a held run; one that is archived."""
     for clutch_id, material in (("ageing", "Carbon"), ("ended", "carbon_2"), ("gone", "paper")):
         record = {"clutch_id": clutch_id, "friction_material": material}
         assert client.post("/v1/clutches", json=record).status_code == 201
     for clutch_id, last in (("ageing", 6000), ("ended", 19_000)):
         for cycles in range(0, last + 1, 1900):
-            posted = client.post(f"/v1/clutches/{clutch_id}/runs", json=stationary(cycles, wear=cycles / 26_000))
-            assert posted.status_code == 201
+            post_run(client, stationary(cycles, wear=cycles / 26_000), clutch_id)
     odd = stationary(20_000, run_id="odd")
     odd["channels"]["torque_nm"] = [100 * value for value in odd["channels"]["torque_nm"]]
     assert client.post("/v1/clutches/ended/runs", json=odd).json()["state"] == "held"

@@ -13,16 +13,11 @@ from sqlalchemy import event
 from storage import clutches
 from tests.service.clients import client_on
 from tests.service.web.routes.granting import context_of
-from tests.support import stationary
-
-
-def post_tests(client: TestClient, clutch_id: str = "c1") -> None:
-    for cycles in (0, 1000, 2000):
-        assert client.post(f"/v1/clutches/{clutch_id}/runs", json=stationary(cycles)).status_code == 201
+from tests.support import post_tests
 
 
 def test_requests_are_counted_by_route_and_not_by_name(client: TestClient) -> None:
-    post_tests(client)
+    post_tests(client, 0, 1000, 2000)
     client.get("/v1/clutches/nobody")
     client.get("/no/such/place")
     answer = client.get("/metrics")
@@ -36,12 +31,11 @@ def test_requests_are_counted_by_route_and_not_by_name(client: TestClient) -> No
 
 
 def test_clutches_runs_and_what_waits_are_counted_together(client: TestClient) -> None:
-    post_tests(client)
+    post_tests(client, 0, 1000, 2000)
     client.post("/v1/clutches", json={"clutch_id": "c2"})
     database = context_of(client).database
     with database.writing() as connection:
         row = clutches.get(connection, "c2")
-        assert row is not None
         clutches.set_summary(connection, "c2", 0.0, row.summary, life="", state="failure", if_disputed="failure")
     lines = client.get("/metrics").text.splitlines()
     for line in (
@@ -86,11 +80,11 @@ def _cost(client: TestClient) -> tuple[int, set[str]]:
 def test_more_clutches_cost_no_more_unless_each_is_asked_for(database_url: str, clutch_metrics: bool) -> None:
     with client_on(database_url, clutch_metrics=clutch_metrics) as client:
         client.post("/v1/clutches", json={"clutch_id": "c1"})
-        post_tests(client)
+        post_tests(client, 0, 1000, 2000)
         few, few_series = cost(client)
         for number in range(2, 40):
             assert client.post("/v1/clutches", json={"clutch_id": f"c{number}"}).status_code == 201
-        post_tests(client, "c2")
+        post_tests(client, 0, 1000, 2000, to="c2")
         many, many_series = cost(client)
         assert few == many
         assert 0 < few < 13
@@ -132,7 +126,6 @@ def test_of_several_processes_at_a_port_all_are_counted(database_url: str, tmp_p
         return subprocess.Popen(command, env=environment, text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
 
     def said(process: "subprocess.Popen[str]") -> dict[str, float]:
-        assert process.stdout is not None
         values = {}
         for line in iter(process.stdout.readline, "\n"):
             if not line.startswith("#"):

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from fastapi.testclient import TestClient
 
-from tests.support import stationary
+from tests.support import post_tests, stationary
 
 # --- What is sent twice in two notations is one thing: identity is of values.
 
@@ -168,8 +168,7 @@ def test_a_bomb_meets_the_bound_on_bodies(client: TestClient) -> None:
 
 @pytest.mark.parametrize("name", ["series", "series.csv", "degradation", "runs"])
 def test_an_answer_is_packed_for_who_takes_it_and_each_form_has_its_tag(client: TestClient, name: str) -> None:
-    for cycles in (0, 1000):
-        assert client.post(RUNS, json=stationary(cycles)).status_code == 201
+    post_tests(client, 0, 1000)
     address = f"/v1/clutches/c1/{name}"
     for _ in range(2):  # the second time as a poll
         plain, packed = client.get(address, headers=PLAIN), client.get(address)

@@ -155,7 +155,6 @@ def test_a_call_that_waits_too_long_is_refused_and_never_begun(workers: Workers,
         with pytest.raises(BusyError, match="the request waited"):
             call.result(IN_TIME)
     oldest = workers.oldest()
-    assert oldest is not None
     assert oldest[0] is Lane.ANSWERS
     assert 0 < oldest[1] < IN_TIME
     gate.touch()
@@ -199,7 +198,6 @@ def test_workers_end_with_a_service_that_is_killed(database: Database) -> None:
     assert ours.poll(IN_TIME)
     pids = ours.recv()
     assert len(set(pids)) == len(Lane)
-    assert service.pid is not None
     os.kill(service.pid, SIGKILL)
     service.join(IN_TIME)
     until(lambda: all(_state(pid) == "Z" for pid in pids), within=IN_TIME)

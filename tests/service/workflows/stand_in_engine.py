@@ -39,8 +39,7 @@ def _course(self: Extension, cycles: Any, pressure: Any, velocity: Any) -> Any:
 
 
 def _exponent(self: Extension) -> float | None:
-    found: float | None = self.content.get("severity_exponent")
-    return found
+    return self.content.get("severity_exponent")
 
 
 METHODS = {

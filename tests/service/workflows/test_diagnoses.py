@@ -28,7 +28,7 @@ from tests.service.clients import client_on, post_run
 from tests.service.work.replaying import replay_clutch
 from tests.service.work.waiting import until
 from tests.service.workflows import stand_in_engine
-from tests.support import stationary
+from tests.support import post_tests
 
 BASE = "/v1/clutches/c1"
 RUL = f"{BASE}/remaining-useful-life"
@@ -51,11 +51,6 @@ def service(folder: Path, engine: str = "diagnose", **settings: Any) -> Iterator
     with client_on(f"sqlite:///{folder / 'a.db'}", engine=engine, **settings) as client:
         client.post("/v1/clutches", json={"clutch_id": "c1"})
         yield client
-
-
-def post_tests(client: TestClient, *cycles: float) -> None:
-    for each in cycles:
-        post_run(client, stationary(each, run_id=f"r{each:g}"))
 
 
 def asked(client: TestClient, wait: int = 0, clutch: str = "c1", **body: Any) -> Any:
@@ -273,8 +268,7 @@ def test_the_same_runs_under_another_name_get_the_same_report_and_remaining_life
     with service(tmp_path) as client:
         client.post("/v1/clutches", json={"clutch_id": "c2"})
         for clutch in ("c1", "c2"):
-            for cycles in (0.0, 1000.0, 2000.0):
-                post_run(client, stationary(cycles, run_id=f"r{cycles:g}"), clutch)
+            post_tests(client, 0.0, 1000.0, 2000.0, to=clutch)
         for method in METHODS:
             address = f"/v1/clutches/{{}}/remaining-useful-life?method={method}"
             one, other = (client.get(address.format(clutch)).json() for clutch in ("c1", "c2"))

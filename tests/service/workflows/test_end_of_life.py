@@ -2,7 +2,6 @@
 
 import csv
 import time
-from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -15,7 +14,7 @@ from fastapi.testclient import TestClient
 from service.workflows.learn_fleet import refresh
 from storage.engine.opening import open_database
 from tests.real import loaders
-from tests.service.clients import client_of
+from tests.service.clients import filled_client
 from tests.service.work.replaying import InThread
 from tests.support import serving, stationary
 
@@ -32,16 +31,11 @@ def post(client: httpx2.Client, body: dict[str, Any], status: int = 201, path: s
     return answer.json()
 
 
-def fill(client: TestClient) -> None:
+@filled_client
+def tested(client: TestClient) -> None:
     """A clutch with four tests up to 3000 cycles, half of the way to its end."""
     for cycles in (0, 1000, 2000, 3000):
         post(client, stationary(cycles, run_id=f"test-{cycles}", **FEW))
-
-
-@pytest.fixture
-def tested(tmp_path: Path) -> Iterator[TestClient]:
-    with client_of(tmp_path / "a.db", fill) as client:
-        yield client
 
 
 def life(client: TestClient, **query: Any) -> Any:

@@ -155,7 +155,6 @@ def test_after_a_rebuild_cof_may_jump_back_and_a_second_life_go_as_the_first_did
 def test_wrong_units_and_dead_channels_are_held(name: str) -> None:
     wrong = slips.UNITS.get(name) or slips.UNPLUGGED[name]
     body = wrong(np.random.default_rng(5), next_test())
-    assert body is not None
     answer = bench_after().answer(body)
     assert answer.codes
     if name in slips.UNITS:

@@ -42,5 +42,4 @@ def inspected(client: TestClient, body: dict[str, Any] = WORN, clutch_id: str = 
     """Post an inspection; its address."""
     answer = client.post(f"/v1/clutches/{clutch_id}/inspections", json=body)
     assert answer.status_code == 201, answer.text
-    address: str = answer.headers["location"]
-    return address
+    return answer.headers["location"]

@@ -1,7 +1,5 @@
 """Lives that end by more than mean COF, and tracks of any quantity, over HTTP."""
 
-from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,14 +12,15 @@ from models.rig.campaign import simulate
 from models.rig.programme import Programme
 from models.rig.sampled import DynamicTest
 from service.run_files.simulated import simulated_body
-from tests.service.clients import client_of, post_run
+from tests.service.clients import filled_client, post_run
 from tests.support import one_quick
 
 WAIT = {"Prefer": "wait=60"}
 SHUDDER = {"quantity": "slope", "pressure_bar": 5, "speed_rpm": 100}
 
 
-def fill(client: TestClient) -> None:
+@filled_client
+def tested(client: TestClient) -> None:
     """A simulated clutch whose friction soon falls with speed at 100 rpm, six tests with loops."""
     record = {"clutch_id": "s", "origin": "simulated", "end_of_life": {"criteria": [{"quantity": "mean_cof"}, SHUDDER]}}
     assert client.post("/v1/clutches", json=record).status_code == 201
@@ -29,17 +28,10 @@ def fill(client: TestClient) -> None:
         post_run(client, simulated_body(run), "s")
 
 
-@pytest.fixture
-def tested(tmp_path: Path) -> Iterator[TestClient]:
-    with client_of(tmp_path / "a.db", fill) as client:
-        yield client
-
-
 def asked(client: TestClient, path: str, **query: Any) -> dict[str, Any]:
     answer = client.get(f"/v1/clutches/s/{path}", params=query, headers=WAIT)
     assert answer.status_code == 200, answer.text
-    body: dict[str, Any] = answer.json()
-    return body
+    return answer.json()
 
 
 def test_a_clutch_that_shudders_first_is_said_so(tested: TestClient) -> None:

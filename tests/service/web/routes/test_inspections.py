@@ -13,7 +13,7 @@ from fastapi.testclient import TestClient
 from service.workflows import inspect_clutch
 from tests.service.web.routes.granting import granted
 from tests.service.web.routes.surfaces import FRESH, JPEG, WEBP, WORN, inspected, png, sha256
-from tests.support import stationary
+from tests.support import post_tests
 
 BASE = "/v1/clutches/c1"
 LIST = f"{BASE}/inspections"
@@ -89,8 +89,7 @@ def test_an_inspection_is_withdrawn_with_a_reason_and_restored(client: TestClien
 
 
 def test_an_inspection_changes_no_prediction_and_an_archived_clutch_may_be_inspected(client: TestClient) -> None:
-    for cycles in (0, 1000, 2000):
-        assert client.post(f"{BASE}/runs", json=stationary(cycles)).status_code == 201
+    post_tests(client, 0, 1000, 2000)
     life, clutch = (client.get(f"{BASE}{path}") for path in ("/remaining-useful-life", ""))
     inspected(client)
     assert client.get(f"{BASE}/remaining-useful-life").headers["etag"] == life.headers["etag"]

@@ -8,8 +8,8 @@ import pytest
 from fastapi.testclient import TestClient
 
 from service.lives.plausibility.doubts import Judged
-from tests.service.clients import client_on, post_run
-from tests.support import stationary
+from tests.service.clients import filled_client, post_run
+from tests.support import post_tests, stationary
 
 FORECAST = "/v1/clutches/{}/remaining-useful-life/forecast"
 FEW: dict[str, Any] = {"pressures": (5.0,), "speeds": (20, 120, 520, 1020, 1970)}
@@ -34,20 +34,17 @@ def live(client: TestClient, clutch: str, tests: int, **record: Any) -> None:
         post_run(client, test | {"started_at": f"2026-03-0{1 + place}T08:00:00+00:00"}, clutch)
 
 
-@pytest.fixture(scope="module")
-def aged(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
+@filled_client(scope="module")
+def aged(client: TestClient) -> None:
     """A clutch whose severity is its energy; nobody adds to it."""
-    with client_on(f"sqlite:///{tmp_path_factory.mktemp('aged') / 'clutchlife.db'}") as client:
-        live(client, "aged", 8, severity={"basis": "dissipated_energy", "exponent": 1.0})
-        yield client
+    live(client, "aged", 8, severity={"basis": "dissipated_energy", "exponent": 1.0})
 
 
 def planned(client: TestClient, *blocks: dict[str, float], clutch: str = "aged", **more: Any) -> dict[str, Any]:
     method = more.pop("method", "particle")
     answer = client.post(FORECAST.format(clutch), params={"method": method}, json={"programme": blocks} | more)
     assert answer.status_code == 200, answer.text
-    body: dict[str, Any] = answer.json()
-    return body
+    return answer.json()
 
 
 @pytest.mark.parametrize("method", ["particle", "ukf", "grid"])
@@ -117,8 +114,7 @@ def test_what_cannot_be_counted_is_said(client: TestClient) -> None:
     unknown = {"status": "insufficient_data", "block_severity": [None], "pace_from": None, "end_of_life_at": None}
     assert unknown.items() <= nothing.items()
     assert nothing["remaining_blocks"]["0.5"] is None
-    for cycles in (0.0, 1000.0, 2000.0, 3000.0):
-        post_run(client, stationary(cycles, pressures=(5.0,)))
+    post_tests(client, 0.0, 1000.0, 2000.0, 3000.0, pressures=(5.0,))
     counted = planned(client, {"cycles": 100, "energy_per_cycle_kj": 20}, clutch="c1")
     assert "severity_not_counted" in [warning["code"] for warning in counted["warnings"]]
 

@@ -16,7 +16,7 @@ from service.work.workers import Lane
 from tests.service.clients import client_on
 from tests.service.web.routes.granting import context_of, granted
 from tests.service.work import calls
-from tests.support import serving, stationary
+from tests.support import post_tests, serving, stationary
 
 CLUTCHES = "/v1/clutches"
 WAIT = {"Prefer": "wait=60"}
@@ -128,8 +128,7 @@ def test_who_asks_for_many_answers_holds_up_nobody_else(client: TestClient, tmp_
     """Six that take long are asked for before somebody else's one; callers take turns, so it is the second.
 
     Who asks for an answer that is being made waits for that one."""
-    for cycles in (0.0, 2000.0, 4000.0):
-        client.post(f"{CLUTCHES}/c1/runs", json=stationary(cycles))
+    post_tests(client, 0.0, 2000.0, 4000.0)
     many, one = granted(client, "read"), granted(client, "read")
     workers, ended = context_of(client).workers, []
     held = workers.submit(Lane.ANSWERS, calls.logged, tmp_path / "log", "x", gate)
