@@ -9,22 +9,20 @@ from playwright.sync_api import Browser, Page, expect
 
 from tests.browser.driving import Watched, Wire, turned
 from tests.browser.lives import post, worn
-from tests.support import ONCE, Server, clutchlife, serving, stationary
+from tests.support import ONCE, Server, clutchlife, filled_service, post_tests, serving, stationary
 
 pytestmark = pytest.mark.browser
 
 
-@pytest.fixture(scope="module")
-def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+@filled_service
+def server(running: Server) -> None:
     """A worn-out clutch, an ageing one, a new one and one without a run."""
-    with serving(tmp_path_factory.mktemp("fleet") / "clutchlife.db", loaded=True) as running:
-        worn(running.http, "ageing", last=4000)
-        for name, last in (("worn-out", 19_000), ("new", 500)):
-            running.http.post("/v1/clutches", json={"clutch_id": name, "friction_material": "<i>carbon</i>"})
-            for cycles in range(0, last + 1, 500 if name == "new" else 1900):
-                post(running.http, name, stationary(cycles, wear=cycles / 26_000))
-        running.http.post("/v1/clutches", json={"clutch_id": "waiting"})
-        yield running
+    worn(running.http, "ageing", last=4000)
+    for name, last in (("worn-out", 19_000), ("new", 500)):
+        running.http.post("/v1/clutches", json={"clutch_id": name, "friction_material": "<i>carbon</i>"})
+        for cycles in range(0, last + 1, 500 if name == "new" else 1900):
+            post(running.http, name, stationary(cycles, wear=cycles / 26_000))
+    running.http.post("/v1/clutches", json={"clutch_id": "waiting"})
 
 
 @pytest.fixture
@@ -57,8 +55,10 @@ def test_an_empty_service_says_what_to_do_and_fills_by_itself(browser: Browser, 
     page.get_by_role("heading", name="No run has arrived for this clutch yet").wait_for()
     assert f"--clutch first --url {empty.url}" in page.locator("pre").first.inner_text()
     page.evaluate("window.same = true")
-    for cycles in (0, 1000, 2000):
-        post(empty.http, "first", stationary(cycles, pressures=(5.0,)))
+    post_tests(empty.http, 0, to="first", pressures=(5.0,))
+    turned(page, "history").locator("#chart-predicted").get_by_text("from the third stationary test on").wait_for()
+    turned(page, "loops").locator("#chart-loop-curves").get_by_text("No dynamic Stribeck test yet").wait_for()
+    post_tests(empty.http, 1000, 2000, to="first", pressures=(5.0,))
     expect(turned(page, "runs").locator("#runs .runs > details")).to_have_count(3)
     turned(page, "history").locator("#chart-predicted[data-sketched]").wait_for()
     assert page.evaluate("window.same")
@@ -143,7 +143,8 @@ def test_by_keyboard_alone(watched: Watched) -> None:
 
 
 def test_a_poll_without_news_costs_a_few_hundred_bytes(watched: Watched) -> None:
-    wire = Wire(watched.page)
+    wire, statuses = Wire(watched.page), list[int]()
+    watched.page.on("response", lambda answer: "/v1/clutches?" in answer.url and statuses.append(answer.status))
     page = watched.open("/")
     rows(page)
     for _ in range(60):
@@ -155,6 +156,7 @@ def test_a_poll_without_news_costs_a_few_hundred_bytes(watched: Watched) -> None
     assert first > 1000  # it is packed
     assert len(others) >= 2
     assert max(others) < 600
+    assert statuses[:3] == [200, 304, 304]
 
 
 def test_a_hidden_tab_asks_nothing(watched: Watched) -> None:

@@ -153,6 +153,10 @@ def test_every_line_of_a_service_is_json_from_its_start_to_its_stop(tmp_path: Pa
     assert not any(line.get("route") == "/readyz" for line in lines), "probes are not logged"
     assert "forged" not in said
     assert any("no key exists" in line["message"] for line in lines)
+    with client_on(f"sqlite:///{tmp_path}/threads.db") as client:
+        client.post("/v1/clutches", json={"clutch_id": "c1"})
+        by_threads = client.post("/v1/clutches/c1/runs", json=stationary(0.0)).json()
+    assert answers["post"].json() == by_threads | {"received_at": answers["post"].json()["received_at"]}, "by processes"
 
 
 def test_an_answers_body_does_not_wait_until_its_head_was_received() -> None:
