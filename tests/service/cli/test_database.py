@@ -18,7 +18,7 @@ from service.app import create_app
 from service.cli.serving.serve import bound
 from service.settings import Settings
 from storage.engine.sqlite.connect import service_lock
-from tests.service.clients import client_on, clutchlife
+from tests.service.clients import client_of, client_on, clutchlife
 from tests.service.queries.test_verification import DAMAGE, execute
 from tests.storage.samples import OLD, integrity, old_database, revision
 from tests.support import ONCE, free_port, stationary, wait_until_ready
@@ -153,8 +153,7 @@ def test_every_line_of_a_service_is_json_from_its_start_to_its_stop(tmp_path: Pa
     assert not any(line.get("route") == "/readyz" for line in lines), "probes are not logged"
     assert "forged" not in said
     assert any("no key exists" in line["message"] for line in lines)
-    with client_on(f"sqlite:///{tmp_path}/threads.db") as client:
-        client.post("/v1/clutches", json={"clutch_id": "c1"})
+    with client_of(tmp_path / "threads.db") as client:
         by_threads = client.post("/v1/clutches/c1/runs", json=stationary(0.0)).json()
     assert answers["post"].json() == by_threads | {"received_at": answers["post"].json()["received_at"]}, "by processes"
 

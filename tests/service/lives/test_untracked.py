@@ -15,7 +15,7 @@ from service.lives.history import Event, Life
 from service.lives.model_correction import corrected_cofs
 from storage.engine.opening import open_database
 from tests.plausibility.bench import with_gain
-from tests.service.clients import client_on, post_run
+from tests.service.clients import client_of, post_run
 from tests.service.lives.diagnosis.test_campaign import campaign, idle_record, post
 from tests.service.run_files.test_upload import dynamic_record
 from tests.service.work.replaying import replay_clutch
@@ -223,8 +223,7 @@ def test_whatever_the_order_the_first_test_by_cycles_is_the_reference(client: Te
     names = [run["run_id"] for run in (*USUAL, COLD)]
     assert [name for name in names if "other_oil_temperature" in codes(client, name)] == [COLD["run_id"]]
     answers = [remaining(client)]
-    with client_on(f"sqlite:///{tmp_path / 'in_order.db'}") as other:
-        assert other.post("/v1/clutches", json={"clutch_id": "c1"}).status_code == 201
+    with client_of(tmp_path / "in_order.db") as other:
         for run in sorted((*USUAL, COLD), key=lambda run: float(run["cycles"])):
             post_run(other, run)
         answers.append(remaining(other))

@@ -8,7 +8,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from service.lives.incoming_run import SampledChannels, sampled_record, stationary_plateaus
-from tests.service.clients import post_run
+from tests.service.clients import csv_text, post_run
 from tests.support import stationary, torque_nm
 
 RUNS = "/v1/clutches/c1/runs"
@@ -184,12 +184,10 @@ def test_a_file_brings_it_by_its_titles(client: TestClient) -> None:
     channels = with_plate(stationary(0)["channels"], FRONT, REAR)
     titles = {FRONT: "T_plate front [K]", REAR: "Lamellentemperatur hinten [°C]"}
     columns = channels | {FRONT: [value + 273.15 for value in channels[FRONT]]}
-    lines = [",".join(titles.get(name, name) for name in columns)]
-    lines += [",".join(map(repr, row)) for row in zip(*columns.values(), strict=True)]
-    for kind in ("stationary_stribeck", "dynamic_stribeck"):
-        if kind == "dynamic_stribeck":
-            lines = [f"time_s,{lines[0]}", *(f"{0.01 * row},{line}" for row, line in enumerate(lines[1:]))]
-        sent = client.post(f"{RUNS}/file?kind={kind}&cycles=0&run_id={kind}", content="\n".join(lines).encode())
+    titled = {titles.get(name, name): values for name, values in columns.items()}
+    clock = {"time_s": [0.01 * row for row in range(len(channels[FRONT]))]}
+    for kind, content in (("stationary_stribeck", titled), ("dynamic_stribeck", clock | titled)):
+        sent = client.post(f"{RUNS}/file?kind={kind}&cycles=0&run_id={kind}", content=csv_text(content))
         assert sent.status_code == 201, sent.text
         kept = client.get(f"{RUNS}/{kind}").json()["channels"]
         np.testing.assert_allclose(kept[FRONT], channels[FRONT])
