@@ -82,6 +82,20 @@ class ShapeParameter:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Felt:
+    """What an amplitude without a unit of its own comes to on the rig, for the paragraph."""
+
+    name: str
+    unit: str
+    of: Callable[[float], float]  # of the amplitude in the effect's unit; monotonic
+
+
+def of_twice(exponent: float) -> float:
+    """What twice of something comes to by a power law: 2^x, for an exponent that may be anything."""
+    return math.exp2(max(min(exponent, 100.0), -100.0))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Tried:
     """One point of a shape grid and the log of its prior weight (weights need not sum to one)."""
 
@@ -106,6 +120,7 @@ class Effect:
     prior_sd: float
     positive: bool = False  # else either sign
     scale: float = 1.0  # turns the SI amplitude into `unit`
+    felt: Felt | None = None  # how a sentence states it
     shapes: tuple[ShapeParameter, ...] = ()
     # the shapes to be tried, none where the campaign cannot show the effect
     grid: Callable[[Facts], tuple[Tried, ...]] = lambda _: (Tried(shape=()),)

@@ -143,13 +143,11 @@ FAULTS: tuple[Effect, ...] = (
     ),
     _step(
         "speed_scale_step",
-        "another scale of the speed from a cycle on, as of another encoder or belt",
+        "another scale of the speed, as of another encoder or belt",
         lambda scene, a, _: scene.curve_at(velocity=scene.points.velocity * _factor(a)) - scene.curve,
     ),
-    _step("static_torque_step", "a static torque that steps at a cycle", _parameter_scaled("static_torque")),
-    _step(
-        "stribeck_velocity_step", "a Stribeck velocity that steps at a cycle", _parameter_scaled("stribeck_velocity")
-    ),
+    _step("static_torque_step", "a step of the static torque", _parameter_scaled("static_torque")),
+    _step("stribeck_velocity_step", "a step of the Stribeck velocity", _parameter_scaled("stribeck_velocity")),
     begins(
         _fault(
             "gauge_hysteresis",

@@ -12,7 +12,7 @@ import numpy as np
 from models.arrays import FloatArray
 from models.diagnosis.baseline.laws import Scene
 from models.diagnosis.design.facts import Facts
-from models.diagnosis.effects.effect import Discrepancy, Effect, Kind, Shape, ShapeParameter, Tried
+from models.diagnosis.effects.effect import Discrepancy, Effect, Felt, Kind, Shape, ShapeParameter, Tried, of_twice
 
 #: Whether what a rest did settles with use alone, or by the test's clock as well; and the log of its settling time [s],
 #: which with use alone stays where it is.
@@ -44,12 +44,12 @@ RUNNING_IN = Effect(
     slug="running_in",
     title="Running-in was not finished",
     article="unfinished",
-    physics="The first cycles polish the lining: the friction of a new clutch is off the course that it follows later.",
+    physics="The first cycles polish the lining: a new clutch's friction differs from what it settles to.",
     check="look up for how long the clutch was run in",
     formula="a M_s ∂S/∂M_s e^{-ζ/ζ_r}, or a S e^{-ζ/ζ_r}",
     source="Ompusunggu et al. 2013, section 2.3.1: 200 cycles of running-in before cycle 0",
     kind=Kind.COURSE,
-    amplitude="deviation of friction when new",
+    amplitude="difference of the new clutch's friction from its settled value",
     unit="%",
     prior_sd=0.08,
     scale=100.0,
@@ -172,14 +172,15 @@ LOAD_SEVERITY = Effect(
     slug="load_severity",
     title="Some duty was harder than other",
     article="varying",
-    physics="Engagements of more energy age the clutch faster than as many easy ones.",
-    check="compare the energy of the engagements along the life",
+    physics="An engagement of more energy ages the clutch more than an easy one.",
+    check="compare logged with intended energy an engagement, over the life",
     formula="S(ζ_e) - S(ζ), ζ_e = Σ (E/E_usual)^m over the engagements whose energy was sent",
     source="models.degradation.general_order: dD/dζ = -k Dⁿ with k by the load's severity",
     kind=Kind.COURSE,
     channels=("energy_per_cycle_kj",),
     amplitude="severity exponent m (1: proportional)",
     unit="-",
+    felt=Felt(name="ageing factor of twice the energy an engagement", unit="", of=of_twice),
     prior_sd=0.7,
     positive=True,
     grid=_load_severity_grid,
@@ -227,9 +228,8 @@ def _rest_recovery_change(scene: Scene, amplitude: float, shape: Shape) -> Float
 REST_RECOVERY = Effect(
     slug="rest_recovery",
     title="Friction recovered during a rest",
-    physics="While the clutch rests, additives settle on the lining and oil drains. Friction is then off its course and "
-    "returns within some cycles or minutes of sliding.",
-    check="look up how long the clutch rested before each test",
+    physics="While the clutch rests, additives settle and oil drains: friction starts changed and recovers as it slides.",
+    check="look up the rests before each test: friction must deviate most after the longest",
     formula="a S (ln(1 + rest/1 h)/ln(1 + longest/1 h))^r e^{-(ζ - ζ_rest)/ζ_c}, S or M_s ∂S/∂M_s; with the clock also "
     "e^{-(t - t_rest)/τ}",
     source="boundary films of friction modifiers re-form at rest",

@@ -18,6 +18,7 @@ from models.diagnosis.design.facts import Facts
 from models.diagnosis.effects.effect import (
     Discrepancy,
     Effect,
+    Felt,
     Kind,
     Measure,
     Shape,
@@ -32,9 +33,8 @@ INERTIA_TORQUE = Effect(
     slug="inertia_torque",
     title="Inertia is in the measured torque",
     article="an",
-    physics="A mass between clutch and sensor turns with the shaft: the sensor also measures the torque that "
-    "accelerates it.",
-    check="look at the inertia of what turns between the clutch and the torque sensor",
+    physics="The sensor also measures the torque that accelerates a mass between it and the clutch.",
+    check="check the inertia against the parts that turn between the clutch and the torque sensor",
     formula="J dω/dt",
     source="Newton; on the reference's rig the sensor stands on the grounded side, on others it does not",
     kind=Kind.LAG,
@@ -162,9 +162,8 @@ SQUEEZE_FILM = Effect(
     slug="squeeze_film",
     title="A squeezed film lags behind the speed",
     article="a",
-    physics="While speed rises the film is still thin from before and more asperities carry: torque is higher than "
-    "stationary, also where the curve rises; the GMS attractor cannot reproduce that.",
-    check="repeat a dynamic test at a third of the frequency: its loop must narrow",
+    physics="The oil film lags: while speed rises it is still thin from before, and torque is higher.",
+    check="repeat a dynamic test with warmer oil: only a film's loop narrows",
     formula="a (p/5 bar)^x v̇ / (v/v_0 + f)^(y + 1/2), eq. 7's film to first order; or S(w) for S(v) with C_v v^γ (v/w)^s, "
     "ẇ = (v - w)(w/v_0 + f)^y/τ; or a' (p/5 bar)^(1 + x/2) (H - h), τ ḣ = H - h, "
     "H = (v/v_0 + f)^(0.55/(1 + y))",
@@ -173,6 +172,7 @@ SQUEEZE_FILM = Effect(
     channels=("time_s",),
     amplitude="torque per acceleration at 5 bar and mid speed",
     unit="Nm s²/m",
+    felt=Felt(name="torque per acceleration at 5 bar and mid speed", unit="Nm per m/s²", of=lambda a: a),
     prior_sd=0.05,
     positive=True,
     shapes=(

@@ -25,6 +25,7 @@ from models.diagnosis.design.facts import Facts
 from models.diagnosis.effects.effect import (
     Discrepancy,
     Effect,
+    Felt,
     Kind,
     Measure,
     Shape,
@@ -33,6 +34,7 @@ from models.diagnosis.effects.effect import (
     by_loop,
     followed,
     lagging,
+    of_twice,
 )
 from models.friction.stribeck import GAMMA
 
@@ -85,9 +87,8 @@ OIL_TEMPERATURE = Effect(
     slug="oil_temperature",
     title="Oil temperature changes the viscosity",
     article="changed",
-    physics="Oil temperature differed between tests or within them: warm oil is thinner, shears more easily, and lets "
-    "asperities touch up to a higher speed.",
-    check="compare the oil's temperature between tests; hold it constant, or send it with each run",
+    physics="Oil temperature differed between tests or within them; warm oil is thinner and shears more easily.",
+    check="compare the oil's temperature between tests; hold it constant, or record it with each run",
     formula="C_v |v|^γ ((ν(T)/ν_ref)^β - 1), and V_S (ν(T)/ν_ref)^{κβ} for V_S, ν by ASTM D341 at a film's "
     "temperature, which follows the oil's within τ; κ = -1/γ with β = γ is Hersey's similarity",
     source="ASTM D341-20; M. D. Hersey, J. Wash. Acad. Sci. 4 (1914) 542; Ompusunggu et al. 2013, section 2.3 (80 to 90 °C)",
@@ -95,6 +96,9 @@ OIL_TEMPERATURE = Effect(
     channels=("oil_temperature_c",),
     amplitude="viscosity exponent β (1: proportional)",
     unit="-",
+    felt=Felt(
+        name="viscous torque lost where the oil's viscosity halves", unit="%", of=lambda β: 100.0 * (1.0 - of_twice(-β))
+    ),
     prior_sd=0.7,
     positive=True,
     shapes=(
@@ -196,14 +200,16 @@ VISCOUS_EXPONENT = Effect(
     slug="viscous_exponent",
     title="The viscous term has another exponent than 0.3",
     article="a different",
-    physics="Viscous torque does not grow with the model's power of speed, 0.3: grooves, porosity or another oil give "
-    "another one.",
-    check="look up which oil is in, and whether the grooves are worn",
+    physics="Another oil, or worn grooves, make viscous torque grow with speed differently from the model.",
+    check="check which oil is in and whether the grooves are worn",
     formula="C_v |v|^γ ((|v|/v_0)^δ - 1), v_0 the middle of the speeds",
     source="Ompusunggu et al. 2013, section 3.1.2: γ = 0.3 fixed beforehand",
     kind=Kind.ARTEFACT,
     amplitude="change of exponent δ",
     unit="-",
+    felt=Felt(
+        name="change of viscous torque at twice the middle speed", unit="%", of=lambda δ: 100.0 * (of_twice(δ) - 1.0)
+    ),
     prior_sd=0.2,
     change=_viscous_exponent_change,
     before_lag=True,
@@ -240,7 +246,7 @@ HYDRODYNAMIC_DRAG = Effect(
     formula="a (v/v_0)^m (1 + r)/(1 + r (v/v_0)²) (ν(T)/ν_ref)^t, v_0 the middle of the speeds",
     source="Kato et al., drag torque of disengaged wet clutches; Newtonian shear in an annular gap",
     kind=Kind.ARTEFACT,
-    amplitude="drag in mid speed",
+    amplitude="drag at the middle speed",
     unit="Nm",
     prior_sd=0.5,
     positive=True,

@@ -36,6 +36,7 @@ class Trial:
     """What a test would be."""
 
     text: str  # for the engineer, empty where it is only made as a part of others
+    brief: str = ""  # the same in few words, where it has more than fit into a sentence
     loops: bool = False  # a dynamic test, else a stationary one
     temperature: float | None = None  # of the oil [K], None: as usual
     falling: bool = False  # the speeds of a stationary test
@@ -56,32 +57,50 @@ _LIGHT_TESTS = f"{_LIGHT_SWEEP}, and {_LOOPS}, {_LIGHT}"
 _ALL_LOADS = f"{_LIGHT_SWEEP}, and {_LOOPS}, at the usual pressures and then {_LIGHT}"
 _OPEN_SWEEP = "stationary test with the clutch open (no pressure), at the usual speeds, five times over"
 _OPEN_TESTS = f"{_OPEN_SWEEP}, and dynamic test at 0.3 Hz with the clutch open, ten periods"
+#: The same in few words.
+_LIGHT_BRIEF = "stationary and dynamic tests at low pressures"
+_ALL_BRIEF = "stationary and dynamic tests at usual and low pressures"
 _SIXTY, _HUNDRED = zero_Celsius + 60.0, zero_Celsius + 100.0
 
 TRIALS: dict[str, Trial] = {
-    "loops_0.3hz": Trial(text=f"{_LOOPS}, at the usual pressures", loops=True),
+    "loops_0.3hz": Trial(
+        text=f"{_LOOPS}, at the usual pressures", brief="dynamic test at 0.3 Hz at the usual pressures", loops=True
+    ),
     "light_loops": Trial(text="", loops=True, pressure=0.25),
     "light_loops_60c": Trial(text="", loops=True, pressure=0.25, temperature=_SIXTY),
-    "light_tests": Trial(text=_LIGHT_TESTS, parts=("light_sweep", "light_loops")),
-    "light_tests_60c": Trial(text=f"{_LIGHT_TESTS}, with the oil at 60 °C", parts=("light_sweep", "light_loops_60c")),
+    "light_tests": Trial(text=_LIGHT_TESTS, brief=_LIGHT_BRIEF, parts=("light_sweep", "light_loops")),
+    "light_tests_60c": Trial(
+        text=f"{_LIGHT_TESTS}, with the oil at 60 °C",
+        brief=f"{_LIGHT_BRIEF}, the dynamic ones with the oil at 60 °C",
+        parts=("light_sweep", "light_loops_60c"),
+    ),
     "warm_and_cool": Trial(
         text=f"{_LIGHT_TESTS}, first with the oil as usual, then at 60 °C",
+        brief=f"{_LIGHT_BRIEF}, the dynamic ones also with the oil at 60 °C",
         parts=("light_sweep", "light_loops", "light_loops_60c"),
     ),
-    "all_loads": Trial(text=_ALL_LOADS, parts=("light_sweep", "loops_0.3hz", "light_loops")),
+    "all_loads": Trial(text=_ALL_LOADS, brief=_ALL_BRIEF, parts=("light_sweep", "loops_0.3hz", "light_loops")),
     "all_loads_and_60c": Trial(
         text=f"{_LIGHT_SWEEP}, and {_LOOPS}: at the usual pressures, then {_LIGHT}, then there once more with the oil "
         "at 60 °C",
+        brief=f"{_ALL_BRIEF}, some with the oil at 60 °C",
         parts=("light_sweep", "loops_0.3hz", "light_loops", "light_loops_60c"),
     ),
     "open_sweep": Trial(text=_OPEN_SWEEP, pressure=0.0),
     "open_loops": Trial(text="", loops=True, pressure=0.0),
-    "open_clutch": Trial(text=_OPEN_TESTS, parts=("open_sweep", "open_loops")),
+    "open_clutch": Trial(
+        text=_OPEN_TESTS,
+        brief="stationary and dynamic tests with the clutch open",
+        parts=("open_sweep", "open_loops"),
+    ),
     "open_clutch_and_light": Trial(
-        text=f"{_OPEN_TESTS}; then {_LIGHT_TESTS}", parts=("open_sweep", "open_loops", "light_sweep", "light_loops")
+        text=f"{_OPEN_TESTS}; then {_LIGHT_TESTS}",
+        brief="stationary and dynamic tests with the clutch open and at low pressures",
+        parts=("open_sweep", "open_loops", "light_sweep", "light_loops"),
     ),
     "all_loads_and_open": Trial(
         text=f"{_ALL_LOADS}; then {_OPEN_TESTS}",
+        brief=f"{_ALL_BRIEF}, and with the clutch open",
         parts=("light_sweep", "loops_0.3hz", "light_loops", "open_sweep", "open_loops"),
     ),
     "sweep_60c": Trial(text="stationary test with the oil at 60 °C", temperature=_SIXTY),
@@ -93,16 +112,15 @@ TRIALS: dict[str, Trial] = {
     "light_sweep": Trial(text=_LIGHT_SWEEP, pressure=0.25),
     "light_sweeps": Trial(text=f"{_LIGHT_SWEEP}, five times", pressure=0.25, times=5),
     "repeats": Trial(text="the stationary test again at once, five times", times=5),
-    "more_states": Trial(text="three more stationary tests after further use, spaced as before", later=3),
+    "more_states": Trial(text="three more stationary tests, each after the usual use", later=3),
     "rests": Trial(
-        text="three more stationary tests after further use, spaced as before, with two days' rest before the first and the "
-        "third",
+        text="three more stationary tests, each after the usual use; rest two days before the first and third",
         later=3,
         rest=48 * 3600.0,
     ),
     **{
         f"{name}_energy": Trial(
-            text=f"two more stationary tests after further use, with engagements of {name} the usual energy",
+            text=f"two more stationary tests, each after the usual use but with {name} the usual energy",
             later=2,
             energy=energy,
         )

@@ -84,7 +84,8 @@ def judge(posterior: Posterior) -> Judgement:
     # what averages of plateaus and loops show of an explanation
     chosen = {frozenset(effects) - {UNCATALOGUED, *posterior.vibrations} for effects in sets}
     stand = tuple(cause for cause in fitted if frozenset(cause.slugs) in chosen)
-    unnamed = [alternative for alternative in posterior.probabilities if alternative.unknown]
+    unnamed = next((alternative for alternative in posterior.probabilities if alternative.unknown), NOTHING)
+    likest = posterior.nodes.get(unnamed)
     return Judgement(
         verdict=verdict,
         causes=causes,
@@ -93,7 +94,7 @@ def judge(posterior: Posterior) -> Judgement:
         others=tuple(cause for cause in fitted if cause not in stand),
         where=_where({a.unknown: w - posterior.prior(a) for a, w in posterior.weights.items() if not a.causes}),
         left=_where(posterior.nodes[Alternative(tuple(sorted(stand[0].slugs)))].evidence.structure) if stand else (),
-        likest=unnamed[0].unknown if unnamed and unnamed[0].unknown in FAULT_BY_SLUG else None,
+        likest=next((e for e in likest.fit.effects if e.effect.slug in FAULT_BY_SLUG), None) if likest else None,
         evidence={
             a.causes[0]: w - posterior.prior(a)
             for a, w in posterior.weights.items()

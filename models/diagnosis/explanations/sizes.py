@@ -42,7 +42,6 @@ class Size:
     other_sign: (
         float  # the probability that it is at work without the likelier sign, for nothing of it may be left by then
     )
-    courses: bool  # whether likely courses ask for different signs
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -103,7 +102,7 @@ def sizes_of(problem: FitProblem, judgement: Judgement, rng: np.random.Generator
     counts = np.diff(np.floor(np.cumsum(weight) * criteria.SIZES_SAMPLED + rng.random()), prepend=0.0).astype(int)
     width = max(component.mean.size for component in components)
     samples: list[tuple[float, int, tuple[FittedEffect, ...]]] = []
-    sized: dict[str, list[tuple[float, int]]] = {}
+    sized: dict[str, list[float]] = {}
     for index, (component, count) in enumerate(zip(components, counts.tolist(), strict=True)):
         offs = component.mean + rng.standard_normal((count, width))[:, : component.mean.size] @ component.root.T
         trends = component.trend[0] + offs @ component.trend[1]
@@ -111,7 +110,7 @@ def sizes_of(problem: FitProblem, judgement: Judgement, rng: np.random.Generator
             effects = component.effects(off)
             for effect, size in zip(effects, component.sizes(effects), strict=True):
                 form = float(np.exp(criteria.SIZE_FORM * rng.standard_normal()))
-                sized.setdefault(effect.effect.slug, []).append((size * form, id(component.fit)))
+                sized.setdefault(effect.effect.slug, []).append(size * form)
             named = tuple(effect for effect in effects if effect.effect.slug in judgement.causes)
             samples.append((trend, index, named))
     samples += [(0.0, 0, ())] * (criteria.SIZES_SAMPLED - len(samples))  # nothing at work
@@ -123,7 +122,7 @@ def sizes_of(problem: FitProblem, judgement: Judgement, rng: np.random.Generator
             Draw(weight=1.0 / len(chosen), laws=components[index].fit.laws, effects=effects)
             for _, index, effects in chosen
         ),
-        by_slug={slug: _size(pairs) for slug, pairs in sized.items() if slug in judgement.causes},
+        by_slug={slug: _size(np.array(sizes)) for slug, sizes in sized.items() if slug in judgement.causes},
     )
 
 
@@ -138,18 +137,15 @@ def _shares(judgement: Judgement) -> list[tuple[Fit, float]]:
     return [(cause.fit, share) for cause, share in zip(judgement.stand, shares, strict=True) if share > 0.0]
 
 
-def _size(pairs: Sequence[tuple[float, int]]) -> Size:
-    """A size from samples, each with the number of its refit."""
-    sizes, of = np.array([size for size, _ in pairs]), np.array([index for _, index in pairs])
+def _size(sizes: FloatArray) -> Size:
+    """A size from samples."""
     likelier = max(float((sizes > 0).mean()), float((sizes < 0).mean()))
-    signs = {bool((sizes[of == index] > 0).mean() > 0.5) for index in np.unique(of) if (of == index).mean() > 0.02}
     low, high = np.quantile(sizes, (0.05, 0.95)).tolist()
     return Size(
         value=float(sizes.mean()),
         sd=float(sizes.std()),
         interval=(low, high),
         other_sign=(1.0 - likelier) * sizes.size / criteria.SIZES_SAMPLED,
-        courses=len(signs) > 1,
     )
 
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from models.diagnosis.design.design import CLOCK, CYCLES, FREQUENCY
 from models.diagnosis.effects.faults import FAULT_BY_SLUG
+from models.diagnosis.effects.fitted_effect import FittedEffect
 from models.diagnosis.pooled_fit.gauss_newton import Fit
 from models.diagnosis.raw_records.evidence import FIXED_LINE
 
@@ -123,7 +124,7 @@ class Judgement:
     others: tuple[Fitted, ...] = ()
     where: tuple[Where, ...] = ()  # the axes on which structure lies, most evidence first
     left: tuple[Where, ...] = ()  # the same beside the best that stands
-    likest: str | None = None  # the slug of the fault that is the likeliest of all that has no name, if one is
+    likest: FittedEffect | None = None  # the fault that is the likeliest of all that has no name, if one is
     evidence: Mapping[str, float]  # [nats] by slug of effects alone
 
     @property

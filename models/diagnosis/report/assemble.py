@@ -11,8 +11,7 @@ from models.diagnosis import criteria
 from models.diagnosis.design.design import Design
 from models.diagnosis.effects.catalogue import BY_SLUG
 from models.diagnosis.effects.effect import FROM_THE_START
-from models.diagnosis.effects.faults import FAULT_BY_SLUG
-from models.diagnosis.effects.fitted_effect import Estimate, ranges_of
+from models.diagnosis.effects.fitted_effect import Estimate, FittedEffect, ranges_of
 from models.diagnosis.experiments.test_plan import Advice
 from models.diagnosis.explanations.posterior import Posterior
 from models.diagnosis.explanations.shapeless import outlying_run
@@ -27,7 +26,7 @@ from models.diagnosis.raw_records.evidence import RawEvidence
 from models.diagnosis.report.isolability import unseen_of, visible_of
 from models.diagnosis.report.maps import loop_traces, residual_maps
 from models.diagnosis.report.report import Candidate, Report, misfit_of
-from models.diagnosis.report.summary import effect_name, listed, number, summarise, with_unit
+from models.diagnosis.report.summary import effect_name, number, summarise, with_unit
 from models.diagnosis.validation.held_out import Gain
 
 
@@ -52,9 +51,7 @@ def candidates_of(
                 low, high = (_finite(scale * end) for end in size.interval)
                 estimate = _estimate(slug, size.value, size.sd)
                 estimate = replace(estimate, stated_interval=(low, high), stated_sign=1.0 - size.other_sign)
-            onset = effect.effect.onset(effect.shape)
-            if onset != FROM_THE_START:
-                estimate = replace(estimate, name=f"{estimate.name} (from about {number(onset)} cycles on)")
+            estimate = replace(estimate, name=_with_onset(estimate.name, effect))
         elif slug in records:
             estimate, evidence = records[slug].estimate, records[slug].log_evidence
             estimate = replace(estimate, value=_finite(estimate.value), sd=_finite(estimate.sd))
@@ -72,6 +69,12 @@ def candidates_of(
             )
         )
     return tuple(candidates)
+
+
+def _with_onset(name: str, fitted: FittedEffect) -> str:
+    """A name with the cycles from which on the effect is at work."""
+    onset = fitted.effect.onset(fitted.shape)
+    return name if onset == FROM_THE_START else f"{name} (from about {number(onset)} cycles on)"
 
 
 def _estimate(slug: str, amplitude: float, deviation: float) -> Estimate:
@@ -104,19 +107,15 @@ def reason_against(gain: Gain | None, sizes: Sizes) -> str:
     if not sizes.draws:
         return ""
     if gain is not None and (gain.rmse_after > criteria.MOST_WORSE * gain.rmse_before or gain.log_score_gain < 0):
-        names = listed([effect_name(slug) for slug in sizes.by_slug])
-        known = "is" if len(sizes.by_slug) == 1 else "are"
-        return f"Not to be adopted: {names} {known} known too little to predict left-out runs."
+        return "Not to be adopted, even if confirmed: other runs are predicted no better with it in the model."
     sentences = []
     for slug, size in sizes.by_slug.items():
         if size.other_sign > criteria.SIGN_UNDETERMINED:
             effect = BY_SLUG[slug]
             low, high = (number(effect.scale * end) for end in size.interval)
-            course = "it depends on the assumed course over life, and " if size.courses else ""
             sentences.append(
-                f"Not to be adopted: these data do not determine the size of {effect_name(slug)} (90 % interval "
-                f"{low} to {with_unit(high, effect.unit)}); {course}"
-                f"its sign may be wrong with probability {size.other_sign:.2f}."
+                f"Not to be adopted: not even the sign of {effect_name(slug)} is sure (wrong with probability "
+                f"{size.other_sign:.2f}; 90 % interval {low} to {with_unit(high, effect.unit)})."
             )
     return " ".join(sentences)
 
@@ -183,7 +182,7 @@ def report_of(
         statistics=statistics_of(posterior, judgement, scatter),
         tests=len(problem.design.runs),
         states=int(problem.design.facts.states.size),
-        resembles="" if judgement.likest is None else FAULT_BY_SLUG[judgement.likest].title,
+        resembles="" if judgement.likest is None else _with_onset(judgement.likest.effect.title, judgement.likest),
         scatter=scatter,
     )
     return replace(report, summary=summarise(report))
@@ -204,8 +203,8 @@ def _notes(
     unfinished = [" and ".join(map(effect_name, cause.slugs)) for cause in ran_out]
     if posterior.null.fit.status is FitStatus.OUT_OF_STEPS and posterior.probabilities[NOTHING] > criteria.NEGLIGIBLE:
         unfinished.append("nothing at work")
-    ended = "ended before its optimum: its probability may be larger than stated."
-    notes += [f"The fit with {name} {ended}" for name in unfinished]
+    ended = "ended before its optimum; its probability may be larger than stated."
+    notes += [f"convergence: the fit with {name} {ended}" for name in unfinished]
     if judgement.verdict in {Verdict.CAUSE_AMBIGUOUS, Verdict.UNEXPLAINED_STRUCTURE}:
         # the first baseline before the better one, whose laws may have bent until an outlying run fits
         first_note = outlying_run(baseline.problem, baseline.fit)

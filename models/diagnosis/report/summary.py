@@ -4,15 +4,17 @@ Sentences in the order in which one would ask, of MAX_WORDS words at most: where
 left out. The numbers behind them are the report's fields.
 """
 
-import math
 from collections.abc import Sequence
 from typing import NamedTuple
+
+import numpy as np
 
 from models.diagnosis import criteria
 from models.diagnosis.design.design import CLOCK, CYCLES, FREQUENCY, PHASE, PRESSURE, SPEED, TEMPERATURE, TORQUE
 from models.diagnosis.effects.catalogue import BY_SLUG
 from models.diagnosis.effects.effect import Kind
 from models.diagnosis.effects.fitted_effect import Estimate
+from models.diagnosis.experiments.candidates import TRIALS
 from models.diagnosis.experiments.test_plan import BASELINE, Advice
 from models.diagnosis.explanations.decide import smallest
 from models.diagnosis.explanations.shapeless import ADVICE
@@ -20,7 +22,6 @@ from models.diagnosis.explanations.verdict import UNCATALOGUED, Verdict, probabi
 from models.diagnosis.pooled_fit.projection import RunScatter
 from models.diagnosis.raw_records.evidence import FIXED_LINE
 from models.diagnosis.report.report import Misfit, Report, Visible
-from models.diagnosis.validation.held_out import Gain
 
 _AXES = {
     PRESSURE: "pressure",
@@ -78,16 +79,20 @@ def with_unit(text: str, unit: str) -> str:
     return text if unit in {"-", ""} else f"{text} {unit}"
 
 
-def signed(estimate: Estimate) -> str:
+def signed(estimate: Estimate, slug: str) -> str:
     """Value with its 90 % interval, and the probability of its sign where that is not sure: said to be open where the
     interval holds both signs."""
     sign = None if estimate.one_sided else estimate.sign_probability
-    (low, high), unit = estimate.interval, estimate.unit
+    (low, high), name = estimate.interval, estimate.name
     low = max(low, 0.0) if estimate.one_sided else low
-    size = f"{estimate.name}: {with_unit(number(estimate.value), unit)}"
+    value, unit = estimate.value, estimate.unit
+    if (felt := BY_SLUG[slug].felt) is not None:
+        name, unit = name.replace(BY_SLUG[slug].amplitude, felt.name), felt.unit
+        value, low, high = map(felt.of, (value, low, high))
+    size = f"{name}: {with_unit(number(value), unit)}"
     if high > low:
         size += f", 90 % interval {number(low)} to {with_unit(number(high), unit)}"
-    both_signs = low < 0.0 < high
+    both_signs = estimate.interval[0] < 0.0 < estimate.interval[1]
     if sign is None or (not both_signs and sign > 0.99):  # the interval says it
         return size
     way = f"{'negative' if estimate.value < 0 else 'positive'} with probability {probability(sign)}"
@@ -98,7 +103,9 @@ def number(value: float) -> str:
     """Three digits, without an exponent where that is readable."""
     if 100 <= abs(value) < 1e6:
         return _signed(f"{value:,.0f}")
-    return _signed(f"{value:.3g}") if value == 0 or 1e-4 <= abs(value) < 100 else f"{value:.2e}"
+    if value == 0 or 1e-6 <= abs(value) < 100:
+        return _signed(np.format_float_positional(float(f"{value:.3g}"), trim="-"))
+    return f"{value:.2e}"
 
 
 def _signed(text: str) -> str:
@@ -106,8 +113,8 @@ def _signed(text: str) -> str:
     return text.replace("-", "−")
 
 
-#: How much a sentence matters: it stays; it goes where words are short; it goes first.
-MUST, SHOULD, MAY = 0, 1, 2
+#: How much a sentence matters: it stays; it goes last, and first where there are too many words.
+MUST, RATHER, SHOULD = range(3)
 
 
 class Sentence(NamedTuple):
@@ -125,14 +132,9 @@ def summarise(report: Report) -> str:
         Verdict.CAUSE_AMBIGUOUS: _ambiguous,
         Verdict.UNEXPLAINED_STRUCTURE: _unexplained,
     }
-    found = [Sentence("These data are too few to judge the model.")]
-    if report.verdict in say:
-        found = say[report.verdict](report)
-    tests = f"{report.tests} tests" if report.tests != 1 else "1 test"
-    data = f"{tests} at {_points_of_life(report.states)} {'were' if report.tests != 1 else 'was'} examined."
-    sentences = {sentence.text: sentence for sentence in (Sentence(data, MAY), *found, *_noted(report.notes))}
+    sentences = {sentence.text: sentence for sentence in (*say[report.verdict](report), *_noted(report.notes))}
     kept = list(sentences.values())  # each once
-    for matters in (MAY, SHOULD):
+    for matters in (SHOULD, RATHER):
         for place in range(len(kept) - 1, -1, -1):
             if _words(kept) > criteria.MAX_WORDS and kept[place].matters == matters:
                 del kept[place]
@@ -152,18 +154,16 @@ def _adequate(report: Report) -> list[Sentence]:
             f"from run to run{_scatter(report.scatter)}."
         )
     ]
-    others, mass = list[str](), nothing
-    for item in report.explanations:
-        if item.effects and mass < criteria.SURE:
-            names = " together with ".join(map(_cause_name, item.effects))
-            others.append(f"{names} (probability {probability(item.probability)})")
-            mass += item.probability
-    if others:
-        sentences.append(Sentence(f"Not excluded: {listed(others)}."))
+    other = next((item for item in report.explanations if item.effects), None)
+    if other is not None and nothing < criteria.SURE:
+        names = " together with ".join(map(_cause_name, other.effects))
+        sentences.append(Sentence(f"Not excluded: {names} (probability {probability(other.probability)})."))
     after = "Nothing needs to be done; diagnose again after the next tests."
     if report.scatter is not None and report.scatter.lower > criteria.USUAL_GAIN:
-        after = "The runs scatter more than usual. A zero that drifts between runs would also cause this: "
-        after += "repeat a test at once."
+        after = (
+            "The runs scatter more than usual, perhaps from a drifting zero. Next: repeat the last test immediately, "
+        )
+        after += "and read the torque unloaded before and after."
     sentences += [Sentence(after), *_detection_limits(report)]
     if report.states < 3:
         say = "says" if report.states == 1 else "say"
@@ -184,8 +184,11 @@ def _detection_limits(report: Report) -> list[Sentence]:
     first = [*first, *(v for v in order if v not in first)][: criteria.VISIBLE_MENTIONED]
     sentences = []
     if first:
-        sizes = listed([_shown(visible) for visible in first])
-        sentences = [Sentence(f"Nine times in ten, these data would show {sizes}.")]
+        sizes = listed([_shown(visible) for visible in first], "or")
+        shown = f"Nine times in ten, these tests would have found {sizes}"
+        hidden = "; a fault that starts late or grows slowly must be larger"
+        creeps = any(v.amplitude > 1.5 * v.least for v in first)
+        sentences = [Sentence(f"{shown}{hidden if creeps else ''}.", RATHER)]
     if report.unseen:
         names = listed([effect_name(slug) for slug in report.unseen])
         sentences.append(Sentence(f"These data cannot show, at any size: {names}.", SHOULD))
@@ -193,16 +196,11 @@ def _detection_limits(report: Report) -> list[Sentence]:
 
 
 def _shown(visible: Visible) -> str:
-    """The smallest sizes that show, `a torque zero shift of 0.64 Nm at best and 11 Nm at worst`."""
-    name = _with_article(visible.effect)
-    if visible.unit == "-":
-        name = f"a {BY_SLUG[visible.effect].amplitude.partition(' (')[0]}"
-    hardest = _threshold(visible.amplitude, visible.unit) if math.isfinite(visible.amplitude) else "of no size"
-    return f"{name} of {_threshold(visible.least, visible.unit)} at best and {hardest} at worst"
-
-
-def _threshold(value: float, unit: str) -> str:
-    return with_unit(number(float(f"{value:.2g}")), unit)
+    """The smallest size that shows, `a torque zero shift of 0.64 Nm`."""
+    name, least, unit = _with_article(visible.effect), visible.least, visible.unit
+    if (felt := BY_SLUG[visible.effect].felt) is not None:
+        least, unit = felt.of(least), f"{felt.unit} ({felt.name})".lstrip() if unit == "-" else felt.unit
+    return f"{name} of {with_unit(number(float(f'{least:.2g}')), unit)}"
 
 
 def _scatter(scatter: RunScatter | None) -> str:
@@ -211,7 +209,7 @@ def _scatter(scatter: RunScatter | None) -> str:
         return ""
     median, lower, upper = (f"{100 * share:.2g}" for share in (scatter.median, scatter.lower, scatter.upper))
     if scatter.assumed:
-        return f" (taken as {median} % of the torque; these data can hardly tell)"
+        return f" (assumed {median} % of the torque: too few tests to measure it)"
     return f" ({median} % of the torque; 90 % interval {lower} to {upper} %)"
 
 
@@ -227,8 +225,8 @@ def _named(report: Report) -> list[Sentence]:
             effect, below = BY_SLUG[item.effect], item.estimate.value < 0
             physics = effect.opposite_physics if below and effect.opposite_physics else effect.physics
             seen = [note.partition(": ")[2] for note in report.notes if note.startswith(f"{item.effect}: ")]
-            sentences += [Sentence(physics, SHOULD), *(Sentence(_capitalised(note)) for note in seen)]
-            sentences.append(Sentence(f"{_capitalised(signed(item.estimate))}."))
+            sentences += [Sentence(physics, SHOULD), *(Sentence(f"Here {note}") for note in seen)]
+            sentences.append(Sentence(f"{_capitalised(signed(item.estimate, item.effect))}."))
     companions = [
         f"{effect_name(item.effect)} (probability {probability(item.probability)})"
         for item in report.candidates
@@ -237,57 +235,73 @@ def _named(report: Report) -> list[Sentence]:
     if companions:
         also = "Something else may also be at work; these data do not show it clearly"
         sentences.append(Sentence(f"{also}: {listed(companions, 'or')}.", SHOULD))
-    return [*sentences, *_gained(report), *_next(report)]
-
-
-#: Instead of the size of an effect that was not fitted, or whose quantity was not measured.
-_NO_SIZE = "size not estimated"
+    checks, further = _next(report)
+    if not report.not_adoptable and report.gain is not None and report.gain.forecast_log_score_gain <= 0:
+        further = []  # what is of little use need not be known better
+    return [*sentences, *checks, *_adoption(report), *further]
 
 
 def _ambiguous(report: Report) -> list[Sentence]:
-    """What is certain with its size, then the explanations among which the choice is, each with its probability, and each
-    effect's size where it first comes."""
-    sized = {candidate.effect: candidate.estimate for candidate in report.candidates}
-    shares = probabilities_by_slug(report.explanations)
-    sure = tuple(slug for slug in report.causes if shares.get(slug, 0.0) >= criteria.SURE)
-    near = _worth_saying(report)
-    choices = []
-    for item in (item for item in report.explanations if item.effects in near and set(sure) <= set(item.effects)):
-        names = [_cause_name(slug) for slug in item.effects if slug not in sure]
-        if UNCATALOGUED in item.effects and report.resembles:
-            names[-1] += f", such as {report.resembles}"
-        sizes = [
-            signed(estimate) if estimate.value != 0.0 else _NO_SIZE
-            for slug in item.effects
-            if slug not in sure and (estimate := sized.pop(slug, None)) is not None
-        ]
-        choices.append((" together with ".join(names) or "nothing", item.probability, sizes))
-    certain = [Sentence(f"{_capitalised(signed(sized[slug]))}.") for slug in sure if slug in sized]
-    remaining = [*_gained(report), *_next(report)]
-
-    def others(shown: int) -> list[str]:
-        """All that is not among the first choices."""
-        something = sum(item.probability for item in report.explanations if item.effects)
-        rest = something - sum(chance for _, chance, _ in choices[:shown])
-        return [f"others ({probability(rest)})"] if rest >= 0.005 and not sure else []
-
-    descriptions = [f"{name} ({'; '.join((probability(chance), *sizes))})" for name, chance, sizes in choices]
-    # then without sizes, which are in the report's fields, and with fewer probabilities
-    ways = [[*descriptions, *others(len(choices))]]
-    for shown in range(min(len(choices), 8), 0, -1):
-        brief = [
-            f"{name.partition(', such as ')[0]} "
-            f"({'; '.join((probability(chance), *(size for size in sizes if size == _NO_SIZE)))})"
-            for name, chance, sizes in choices[:shown]
-        ]
-        other_names = [effect_name(slug) for slug in report.causes if slug not in {*sure, UNCATALOGUED}]
-        unsaid = [name for name in other_names if not any(name in alternative for alternative in brief)]
-        ways.append([*brief, *(unsaid or others(shown))])
-    for alternatives in ways:
-        sentences = [*_open(report, sure, certain, alternatives), *remaining]
+    """The explanations among which the choice is, each with its probability, what most of them hold first; what to do."""
+    estimates = {candidate.effect: candidate.estimate for candidate in report.candidates}
+    held = _held_by_most(report)
+    remaining = [Sentence(f"{_capitalised(signed(estimates[slug], slug))}.") for slug in held if slug in estimates]
+    checks, further = _next(report)
+    remaining += [*checks, *further]
+    if report.advice:
+        remaining.append(Sentence("Adopt nothing before the next diagnosis.", RATHER))
+    choices = [item for item in report.explanations if item.effects in _worth_saying(report)]
+    choices = [item for item in choices if set(held) <= set(item.effects)]
+    # without sizes, which are in the report's fields, and with fewer alternatives where there are too many words
+    ways = [(len(choices), False), *((count, True) for count in range(min(len(choices), 8), 0, -1))]
+    for count, brief in ways:
+        alternatives = [_alternative(report, item.effects, held, brief=brief) for item in choices[:count]]
+        said = {*held, UNCATALOGUED}.union(*(item.effects for item in choices[:count]))
+        unsaid = [effect_name(slug) for slug in report.causes if slug not in said] if brief else []
+        left = [item for item in report.explanations if item.effects and set(held) <= set(item.effects)]
+        rest = sum(item.probability for item in left if item not in choices[:count])
+        others = [f"{'with ' * bool(held)}others ({probability(rest)})"] if rest >= 0.005 and not unsaid else []
+        sentences = [_open(report, held, [*alternatives, *unsaid, *others]), *remaining]
         if _words([sentence for sentence in sentences if sentence.matters == MUST]) <= criteria.MAX_WORDS:
             break
     return sentences
+
+
+def _held_by_most(report: Report) -> tuple[str, ...]:
+    """The causes that are SURE to be at work, else the one that is in several explanations and LIKELY."""
+    shares, near = probabilities_by_slug(report.explanations), _worth_saying(report)
+    sure = tuple(slug for slug in report.causes if shares.get(slug, 0.0) >= criteria.SURE)
+    if sure:
+        return sure
+    often = [slug for slug in report.causes if slug in BY_SLUG and sum(slug in effects for effects in near) > 1]
+    likeliest = max(often, key=lambda slug: shares.get(slug, 0.0), default="")
+    return (likeliest,) if shares.get(likeliest, 0.0) >= criteria.LIKELY else ()
+
+
+def _alternative(report: Report, effects: Sequence[str], held: Sequence[str], *, brief: bool) -> str:
+    """An explanation, beside the causes that are held to be at work: its causes, with its probability and their sizes."""
+    estimates = {candidate.effect: candidate.estimate for candidate in report.candidates}
+    beside = [slug for slug in effects if slug not in held]
+    known = [slug for slug in beside if slug in BY_SLUG and slug in estimates]
+    like = f", such as {report.resembles}" if report.resembles and not brief else ""
+    names = [effect_name(slug) if brief else _cause_name(slug) for slug in beside if slug != UNCATALOGUED]
+    names += [f"{_cause_name(UNCATALOGUED)}{like}"] if UNCATALOGUED in beside else []
+    joined = " together with ".join(names)
+    if held:
+        joined = f"with {joined}" if names else "alone"
+    share = next(item.probability for item in report.explanations if item.effects == tuple(effects))
+    sizes = [] if brief else list(filter(None, (_brief_size(estimates[slug], slug) for slug in known)))
+    return f"{joined} ({'; '.join((probability(share), *sizes))})"
+
+
+def _brief_size(estimate: Estimate, slug: str) -> str:
+    """A value with its name, without its interval, where it has a unit that one feels and its sign is known."""
+    low, high = estimate.interval
+    unknown = estimate.value == 0.0 or (low < 0.0 < high and not estimate.one_sided)
+    if unknown or BY_SLUG[slug].felt is not None:
+        return ""
+    size = with_unit(number(estimate.value), estimate.unit)
+    return size if estimate.name in effect_name(slug) else f"{estimate.name} {size}"
 
 
 def _worth_saying(report: Report) -> list[tuple[str, ...]]:
@@ -298,39 +312,30 @@ def _worth_saying(report: Report) -> list[tuple[str, ...]]:
     return [effects for effects in near if shares[effects] > (1.0 - criteria.SURE) * shares[near[0]]]
 
 
-def _open(
-    report: Report, sure: Sequence[str], certain: Sequence[Sentence], alternatives: Sequence[str]
-) -> list[Sentence]:
-    """What is certain with its size, and the alternatives in words."""
+def _open(report: Report, sure: Sequence[str], alternatives: Sequence[str]) -> Sentence:
+    """What is certain, and the alternatives in words."""
     if not sure:
         wrong = 1.0 - sum(item.probability for item in report.explanations if not item.effects)
         disagree = f"probably disagree with the model (probability {probability(wrong)})"
         if wrong > 0.99:
             disagree = "disagree with the model"
         first = "Explanations that remain, with their probabilities"
-        return [Sentence(f"The data {disagree}. {first}: {listed(alternatives, 'or')}.")]
+        return Sentence(f"The data {disagree}. {first}: {listed(alternatives, 'or')}.")
     share = sum(item.probability for item in report.explanations if set(sure) <= set(item.effects))
-    verb = "is at work" if len(sure) == 1 else "are at work"
+    verb = "is" if len(sure) == 1 else "are"
+    verb += " at work" if share >= criteria.SURE else " probably at work"
     names_in_words = f"{listed([_with_article(slug) for slug in sure])} {verb} (probability {probability(share)})"
-    sentences = [Sentence(f"{_capitalised(names_in_words)}."), *certain]
-    if len(alternatives) == 1:
-        sentences.append(Sentence(f"Also at work: {alternatives[0]}."))
-    elif alternatives:
-        sentences.append(Sentence(f"There may also be (with probabilities): {listed(alternatives, 'or')}."))
-    return sentences
+    return Sentence(f"{_capitalised(names_in_words)}: {listed(alternatives, 'or')}.")
 
 
 def _cause_name(slug: str) -> str:
-    return "something that is not in the catalogue" if slug == UNCATALOGUED else effect_name(slug)
+    return "an unknown cause" if slug == UNCATALOGUED else _with_article(slug)
 
 
 def _unexplained(report: Report) -> list[Sentence]:
     unknown = sum(item.probability for item in report.explanations if UNCATALOGUED in item.effects)
-    resembles = f" It most resembles {report.resembles}." if report.resembles else ""
-    first = (
-        f"The model is wrong in a way that no effect of the catalogue explains (probability {probability(unknown)}), "
-    )
-    first += f"so no cause is named.{resembles}"
+    resembles = f" It looks most like {report.resembles}." if report.resembles else ""
+    first = f"The model is wrong in a way that no known cause explains (probability {probability(unknown)}).{resembles}"
     axes = [
         where.axis for where in ([] if report.baseline is None else report.baseline.where[:2]) if where.strength > 0
     ]
@@ -338,7 +343,7 @@ def _unexplained(report: Report) -> list[Sentence]:
     if swings and axes[:1] == [FREQUENCY]:
         sentences, axes = [Sentence(f"In the raw records {swing}") for swing in swings], [FREQUENCY]
     else:
-        sentences = [Sentence(_error(report.baseline, axes)), *_gained(report)]
+        sentences = [Sentence(_error(report.baseline, axes))]
     look_at = ", then ".join(_LOOK_AT[axis] for axis in axes) or "the rig"
     again = "Next: repeat the last test at once and diagnose again. If it is gone, one run caused it; if not, look at"
     return [Sentence(first), *sentences, Sentence(f"{again} {look_at}.")]
@@ -348,114 +353,71 @@ def _error(misfit: Misfit | None, axes: Sequence[str]) -> str:
     """The baseline's error, and what it depends on."""
     if misfit is None:
         return ""
-    size, where = number(misfit.rmse), listed([_AXES[axis] for axis in axes])
-    if misfit.rmse <= misfit.noise:
+    size, noise, where = number(misfit.rmse), number(misfit.noise), listed([_AXES[axis] for axis in axes])
+    if misfit.rmse <= misfit.noise or size == noise:
         pattern = f", but it is not random: it depends on {where}" if where else ""
         return f"The error is small ({size} Nm RMS, no more than the noise){pattern}."
     depends = f", and depends on {where}" if where else ""
-    return f"The error is {size} Nm RMS, where noise alone gives {number(misfit.noise)} Nm{depends}."
+    return f"The error is {size} Nm RMS, where noise alone gives {noise} Nm{depends}."
 
 
-def _gained(report: Report) -> list[Sentence]:
-    """What the extension gains on runs that were held out, whether it improves remaining life, why it may not be adopted."""
-    gain = report.gain
-    if report.not_adoptable:
-        return [Sentence(report.not_adoptable)]
-    if gain is None:
-        return []
-    added = {
-        Verdict.CAUSE_NAMED: "this cause" if len(report.causes) == 1 else "these causes",
-        Verdict.UNEXPLAINED_STRUCTURE: "a smooth correction",
-    }.get(report.verdict, listed([effect_name(slug) for slug in report.extended_effects]))
-    way = "smaller" if gain.reduction_percent >= 0 else "larger"
-    change = f"{abs(gain.reduction_percent):.1f} ± {gain.reduction_sd:.1f} % {way}"
-    hardest = _hardest(gain, report.extended)
-    left_out = f"With {added} in the model, the error on runs left out of the fit is {change}.{hardest}"
-    sentences = [Sentence(left_out, SHOULD)]
-    if report.verdict is Verdict.UNEXPLAINED_STRUCTURE:
-        return sentences
-    better = gain.forecast_log_score_gain > 0
+def _adoption(report: Report) -> list[Sentence]:
+    """What adopting a named cause would do, or why it may not be adopted."""
     adoptable = () if report.extension is None else report.extension.effects
-    way = "better" if better else "no better"
-    ahead = f"The last tests are predicted {way} from the earlier ones with {added} in the model"
-    ahead += "; you can adopt this." if adoptable and better else "."
-    if courses := listed([effect_name(slug) for slug in adoptable if BY_SLUG[slug].kind is Kind.COURSE]):
-        then = f"includes {courses}" if better else f"leaves out how {courses} goes on"
-        ahead += f" If you adopt it, the predicted remaining life {then}."
-    return [*sentences, Sentence(ahead, SHOULD if report.verdict is Verdict.CAUSE_AMBIGUOUS else MUST)]
+    if report.not_adoptable or report.gain is None or not adoptable:
+        return [Sentence(report.not_adoptable)]
+    it = "it" if len(report.causes) == 1 else "them"
+    if report.gain.forecast_log_score_gain <= 0:
+        return [
+            Sentence(f"If that confirms {it}, adopting {it} is of little use: later tests are predicted no better.")
+        ]
+    courses = listed([effect_name(slug) for slug in adoptable if BY_SLUG[slug].kind is Kind.COURSE])
+    then = ["measurements are then corrected"] if any(BY_SLUG[s].kind is not Kind.COURSE for s in adoptable) else []
+    then += [f"the predicted remaining life then includes {courses}"] if courses else []
+    return [Sentence(f"If that confirms {it}, adopt {it}: {listed(then)} and later tests are predicted better.")]
 
 
-def _hardest(gain: Gain, extended: Misfit | None) -> str:
-    """Where held-out runs are predicted far worse than they were fitted, and how far from what was kept that is."""
-    hardest = gain.hardest
-    if hardest is None or extended is None or gain.rmse_after < 5.0 * extended.rmse:  # less is what gains make
-        return ""
-    what, size, unit = ("curves", 1e-5, "bar") if hardest.axis == PRESSURE else ("tests", 1.0, "cycles")
-    extrapolation = f"{number(size * hardest.beyond)} {unit} outside" if hardest.beyond > 0.0 else "within"
-    place = f"{number(size * hardest.value)} {unit}, {extrapolation} the others' range"
-    errors = f"{number(hardest.rmse)} Nm RMS, against {number(extended.rmse)} Nm for all tests when none is left out"
-    return f" Worst are the {what} at {place}: {errors}."
-
-
-def _next(report: Report) -> list[Sentence]:
-    """What to look at of a named cause, and the first test of the plan with what it is good for; where no test is, what to
-    look at of the likeliest explanation."""
+def _next(report: Report) -> tuple[list[Sentence], list[Sentence]]:
+    """What to look at, of a named cause or where no test is, of the likeliest explanation; and the first test of the plan
+    with what it is good for."""
     looked_at = [report.causes] if report.verdict is Verdict.CAUSE_NAMED else []
-    if not looked_at and not report.advice:
+    no_test = not report.advice or (not report.advice[0].narrows and report.advice[0].nats < criteria.WORTHWHILE)
+    if not looked_at and no_test:
         looked_at = _worth_saying(report)
     known = ([BY_SLUG[slug].check for slug in effects if slug in BY_SLUG] for effects in looked_at)
-    checks = next(filter(None, known), [])
-    sentences = [Sentence(f"Next: {'; '.join(checks)}.")] if checks else []
+    checks = [Sentence(f"Next: {'; '.join(each)}.") for each in [next(filter(None, known), [])] if each]
     if not report.advice:
         no_more = "" if report.gain is None else "No further test would tell much more."
-        return [*sentences, Sentence(no_more, SHOULD)]
+        return checks, [Sentence(no_more, SHOULD)]
     best = report.advice[0]
     if best.narrows:
-        narrower = f"its interval narrows by {100 * (1 - best.narrows):.0f} %"
-        size = "its size" if len(report.causes) == 1 else f"the size of {effect_name(best.effect)}"
-        to_measure = "To measure" if sentences else "Next, to measure"
-        return [*sentences, Sentence(f"{to_measure} {size} better: {brief_test(best)}; {narrower}.")]
-    first = "Then" if sentences else "Next"
+        value = "value" if len(report.causes) == 1 else f"value of {effect_name(best.effect)}"
+        better = f"{'For' if checks else 'Next, for'} a closer {value}: {_test(best)}"
+        narrower = f"it narrows the interval by {100 * (1 - best.narrows):.0f} %"
+        return checks, [Sentence(f"{better}; {narrower}.", RATHER if checks else MUST)]
+    first = "Then" if checks else "Next"
     if best.nats < criteria.WORTHWHILE:
-        first = "No single test is likely to decide. The best"
+        return checks, [Sentence(f"Most helpful, though unlikely to decide: {_test(best)}.")]
     decides = f"It decides with probability {probability(best.probability)}"
-    if best.other == BASELINE:
-        decides += f" whether {_cause_name(best.effect)} is at work"
+    held = _held_by_most(report) if report.verdict is Verdict.CAUSE_AMBIGUOUS else ()
+    doubtful = [slug for slug in (best.effect, best.other) if slug not in {*held, BASELINE}]
+    if len(doubtful) == 1:
+        decides += f" whether {_cause_name(doubtful[0])} is at work"
     elif {(best.effect,), (best.other,)} != set(_worth_saying(report)):
-        decides += f" (hardest to tell apart: {_cause_name(best.effect)} and {_cause_name(best.other)})"
-    return [*sentences, Sentence(f"{first}: {brief_test(best)}. {decides}.")]
+        decides += f"; hardest to tell apart are {listed([_cause_name(slug) for slug in doubtful])}"
+    return checks, [Sentence(f"{first}: {_test(best)}. {decides}.")]
 
 
-#: Words from which a test is put shortly. The longest test of one kind has 16, two kinds take 29 and more.
-_LONG_TEST = 20
-
-
-def brief_test(advice: Advice) -> str:
-    """A test in words; a long one by its kinds, pressures, speeds and frequency alone, as a rig is set. Pauses and further
-    use are never left out."""
-    later = any(step.pause for step in advice.steps) or len({step.cycles for step in advice.steps}) > 1
-    if later or len(advice.test.split()) <= _LONG_TEST or not advice.steps:
-        return advice.test
-    kinds = []
-    for kind, name in (("stationary_stribeck", "stationary"), ("dynamic_stribeck", "dynamic")):
-        if steps := [step for step in advice.steps if step.kind == kind]:
-            frequencies = sorted({step.frequency for step in steps if step.frequency is not None})
-            pressures = [float(f"{1e-5 * value:.2g}") for step in steps for value in step.pressures]
-            closed = [value for value in pressures if value > 0.0]
-            opened = ", also with the clutch open" if 0.0 in pressures and closed else ""
-            speeds = _range([round(float(f"{value * 30.0 / math.pi:.3g}")) for step in steps for value in step.speeds])
-            speeds = f"up to{speeds[4:]}" if speeds.startswith("0 to") else speeds
-            oils = {step.temperature - 273.15 for step in steps if step.temperature is not None}
-            oil = f", also at {number(max(oils))} °C" if oils else ""
-            at = [*(f"{number(value)} Hz" for value in frequencies), *([f"{_range(closed)} bar"] if closed else [])]
-            at.append(f"{speeds} rpm")
-            kinds.append(f"{name} tests{'' if closed else ' with the clutch open'} at {', '.join(at)}{opened}{oil}")
-    return f"{', and '.join(kinds)} (steps in the report)"
-
-
-def _range(values: Sequence[float]) -> str:
-    low, high = number(min(values)), number(max(values))
-    return low if low == high else f"{low} to {high}"
+def _test(advice: Advice) -> str:
+    """An advised test, in few words where it has many, with its time on the rig."""
+    trial = TRIALS.get(advice.key)
+    brief = "" if trial is None else trial.brief
+    hours = advice.minutes / 60.0
+    lasts = f"{round(hours):,} hours" if hours >= 3.0 else f"{round(advice.minutes)} minutes" if hours > 0.0 else ""
+    aside = ", ".join(
+        part for part in (f"{lasts} in all" if lasts else "", "steps in the plan" if brief else "") if part
+    )
+    return f"{brief or advice.test} ({aside})" if aside else advice.test
 
 
 def _noted(notes: Sequence[str]) -> list[Sentence]:

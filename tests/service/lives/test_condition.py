@@ -252,8 +252,8 @@ def found(causes: list[str], advice: list[str] | None = None, *, adoptable: bool
         (
             summary(9000.0),
             found(["rest_recovery"]) | {"advice": {"test": TRIALS["rests"].text, "separates": ["rest_recovery"]}},
-            "Out of specification: ", "Run three more stationary tests after further use, spaced as before, with two days' "
-            "rest before the first and the third: it shows whether rest recovery is at work.",
+            "Out of specification: ", "Run three more stationary tests, each after the usual use; rest two days before "
+            "the first and third: it shows whether rest recovery is at work.",
         ),
         (summary(9000.0), found([]), "Out of specification: ", "Read the diagnosis before you rely on the forecast."),
     ],

@@ -44,9 +44,9 @@ def test_an_offset_whose_sign_depends_on_the_course_assumed_is_no_adoption(creep
 def test_where_nothing_of_a_size_may_be_left_its_sign_is_not_determined() -> None:
     """Samples whose form leaves nothing of it after the last state have no sign."""
     tenth = SIZES_SAMPLED // 10
-    assert _size([(0.0, 0)] * 3 * tenth + [(4.4, 0)] * 7 * tenth).other_sign == pytest.approx(0.3)
-    assert _size([(-1.0, 0)] * tenth + [(4.4, 0)] * 9 * tenth).other_sign == pytest.approx(0.1)
-    assert _size([(4.4, 0)] * 10 * tenth).other_sign == 0.0
+    assert _size(np.repeat([0.0, 4.4], [3 * tenth, 7 * tenth])).other_sign == pytest.approx(0.3)
+    assert _size(np.repeat([-1.0, 4.4], [tenth, 9 * tenth])).other_sign == pytest.approx(0.1)
+    assert _size(np.full(10 * tenth, 4.4)).other_sign == 0.0
 
 
 def test_a_zero_whose_sign_is_known_is_offered_by_draws_that_carry_only_what_the_report_names(shifted: Report) -> None:

@@ -53,8 +53,8 @@ def reported(
     [
         (GAIN, ""),
         (None, ""),
-        (WORSE, "is known too little to predict left-out runs"),
-        (LARGER, "is known too little to predict left-out runs"),
+        (WORSE, "other runs are predicted no better"),
+        (LARGER, "other runs are predicted no better"),
     ],
 )
 def test_an_extension_that_predicts_worse_is_withheld_and_the_verdict_stays(given, posterior, gain, why):
@@ -81,20 +81,24 @@ def test_what_no_reading_shows_is_no_candidate_and_a_fit_that_ran_out_of_steps_i
     judgement = judge(posterior)
     (cause,) = judgement.stand
     cut = replace(cause, fit=replace(cause.fit, status=FitStatus.OUT_OF_STEPS))
-    expected = "The fit with unsettled dwell ended before its optimum: its probability may be larger than stated."
+    expected = (
+        "convergence: the fit with unsettled dwell ended before its optimum; its probability may be larger than stated."
+    )
     assert expected in reported(given, posterior, replace(judgement, stand=(cut,))).notes
     assert expected not in reported(given, posterior, judgement).notes
 
 
 def test_why_an_extension_is_not_proposed_is_said(given: Study) -> None:
     assert reason_against(LARGER, Sizes(by_slug={})) == ""  # nothing was fitted
-    either = Size(value=1e4, sd=2e4, interval=(-2e4, 4e4), other_sign=0.3, courses=True)
+    either = Size(value=1e4, sd=2e4, interval=(-2e4, 4e4), other_sign=0.3)
     some = Sizes(draws=(Draw(weight=1.0, laws=given.baseline.fit.laws),), by_slug={"pressure_offset": either})
     said = reason_against(GAIN, some)
-    assert "size of pressure offset (90 % interval −0.2 to 0.4 bar); it depends on the assumed" in said
-    positive = replace(either, interval=(1e3, 4e4), other_sign=0.03, courses=False)
+    assert (
+        "not even the sign of pressure offset is sure (wrong with probability 0.30; 90 % interval −0.2 to 0.4" in said
+    )
+    positive = replace(either, interval=(1e3, 4e4), other_sign=0.03)
     said = reason_against(GAIN, replace(some, by_slug={"pressure_offset": positive}))
-    assert "(90 % interval 0.01 to 0.4 bar); its sign may be wrong with probability 0.03." in said
+    assert "(wrong with probability 0.03; 90 % interval 0.01 to 0.4 bar)." in said
     sure = replace(either, interval=(1e4, 4e4), other_sign=0.001)
     assert reason_against(GAIN, replace(some, by_slug={"pressure_offset": sure})) == ""
 
@@ -127,7 +131,7 @@ def test_the_size_of_a_swing_has_no_sign(given: Study) -> None:
     raw = (RawEvidence(effect="shaft_ripple", log_evidence=50.0, estimate=estimate, note="it swings"),)
     found = posterior_of(given.baseline, raw)
     (ripple,) = (c for c in candidates_of(found.problem, judge(found), raw, {}) if c.effect == "shaft_ripple")
-    assert signed(ripple.estimate) == "ripple amplitude: 0.5 Nm, 90 % interval 0.467 to 0.533 Nm"
+    assert signed(ripple.estimate, "shaft_ripple") == "ripple amplitude: 0.5 Nm, 90 % interval 0.467 to 0.533 Nm"
 
 
 # --- Residual maps against means taken row by row, NaN where nothing was measured, loops as they were measured.
