@@ -42,7 +42,7 @@ _LOOK_AT = {
     CLOCK: "what warms or drifts during a test",
     TEMPERATURE: "the oil's thermometer and the plate's temperature",
     PHASE: "filters and delays between the channels",
-    FREQUENCY: "what turns, or is driven, like that",
+    FREQUENCY: "what turns or is driven at that rate",
 }
 
 
@@ -374,22 +374,22 @@ def _adoption(report: Report) -> list[Sentence]:
     courses = listed([effect_name(slug) for slug in adoptable if BY_SLUG[slug].kind is Kind.COURSE])
     then = ["measurements are then corrected"] if any(BY_SLUG[s].kind is not Kind.COURSE for s in adoptable) else []
     then += [f"the predicted remaining life then includes {courses}"] if courses else []
-    return [Sentence(f"If that confirms {it}, adopt {it}: {listed(then)} and later tests are predicted better.")]
+    better = listed([*then, "later tests are predicted better"])
+    return [Sentence(f"If that confirms {it}, adopt {it}: {better}.")]
 
 
 def _next(report: Report) -> tuple[list[Sentence], list[Sentence]]:
     """What to look at, of a named cause or where no test is, of the likeliest explanation; and the first test of the plan
     with what it is good for."""
     looked_at = [report.causes] if report.verdict is Verdict.CAUSE_NAMED else []
-    no_test = not report.advice or (not report.advice[0].narrows and report.advice[0].nats < criteria.WORTHWHILE)
-    if not looked_at and no_test:
-        looked_at = _worth_saying(report)
+    best = report.advice[0] if report.advice else None
+    if not looked_at and (best is None or best.narrows or best.nats < criteria.WORTHWHILE):  # no test is to decide
+        looked_at = [_held_by_most(report), *_worth_saying(report)]
     known = ([BY_SLUG[slug].check for slug in effects if slug in BY_SLUG] for effects in looked_at)
     checks = [Sentence(f"Next: {'; '.join(each)}.") for each in [next(filter(None, known), [])] if each]
-    if not report.advice:
+    if best is None:
         no_more = "" if report.gain is None else "No further test would tell much more."
         return checks, [Sentence(no_more, SHOULD)]
-    best = report.advice[0]
     if best.narrows:
         value = "value" if len(report.causes) == 1 else f"value of {effect_name(best.effect)}"
         better = f"{'For' if checks else 'Next, for'} a closer {value}: {_test(best)}"

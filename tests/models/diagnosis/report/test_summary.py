@@ -263,7 +263,7 @@ def test_a_certain_cause_with_sized_companions_keeps_to_the_words() -> None:
     assert len(said.split()) <= MAX_WORDS
     assert "pressure offset" in said
     assert "torque zero shift" in said
-    assert "Next, for a closer value of oil change: " in said
+    assert "For a closer value of oil change: " in said
 
 
 def test_a_test_of_many_words_is_put_into_a_short_line_with_its_time() -> None:
@@ -303,7 +303,7 @@ def test_a_swing_without_a_name_is_said_as_what_it_is() -> None:
     notes = ("fixed_line: torque swings at 12.5 Hz at all speeds alike.",)
     said = summarise(replace(findings(Verdict.UNEXPLAINED_STRUCTURE), baseline=misfit, notes=notes))
     assert "In the raw records torque swings at 12.5 Hz at all speeds alike." in said
-    assert said.endswith("look at what turns, or is driven, like that.")
+    assert said.endswith("look at what turns or is driven at that rate.")
 
 
 def test_of_a_vibration_its_frequency_is_said_and_what_to_look_at() -> None:
