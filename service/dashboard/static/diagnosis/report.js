@@ -56,16 +56,7 @@ export function report(diagnosis) {
       diagnosis.summary ? h("p", diagnosis.summary) : null,
       quiet(date, outdated(diagnosis)),
     ),
-    h(
-      "div.columns",
-      candidates(diagnosis),
-      fitness(diagnosis),
-      gain(diagnosis),
-      where(diagnosis),
-      advice(diagnosis),
-      notes(diagnosis),
-      visible(diagnosis),
-    ),
+    h("div.columns", ...PARTS.map((each) => each(diagnosis))),
   ];
 }
 
@@ -75,25 +66,21 @@ function outdated({ earlier_life: earlier, stale }) {
   return stale ? h("b", " Runs were added after this diagnosis: start a new one.") : null;
 }
 
-/**
- * Of an ambiguous verdict the causes that are certain.
- * @param {{ verdict: string | null, causes?: string[], candidates?: CandidateOut[] }} diagnosis
- */
+/** @typedef {{ verdict: string | null, causes?: string[], candidates?: CandidateOut[] }} Judged */
+
+/** @type {(diagnosis: Judged) => string[]} of an ambiguous verdict the causes that are certain */
 function certain({ verdict, causes = [], candidates: all = [] }) {
   const likely = all.filter((candidate) => (candidate.probability ?? 0) >= CERTAIN).map(({ effect }) => effect);
   return verdict === "cause_ambiguous" ? causes.filter((cause) => likely.includes(cause)) : [];
 }
 
-/** @param {{ verdict: string | null, causes?: string[], candidates?: CandidateOut[] }} diagnosis */
+/** @param {Judged} diagnosis */
 export function heading(diagnosis) {
   const verdict = diagnosis.verdict ?? "";
   return certain(diagnosis).length > 0 ? "Cause certain, others possible" : (VERDICTS[verdict] ?? words(verdict));
 }
 
-/**
- * The verdict as a sentence.
- * @param {{ verdict: string | null, causes?: string[], candidates?: CandidateOut[] }} diagnosis
- */
+/** @type {(diagnosis: Judged) => string} the verdict as a sentence */
 export function sentence(diagnosis) {
   const sure = certain(diagnosis);
   const verdict = sure.length > 0 ? "cause_named" : diagnosis.verdict;
@@ -249,6 +236,8 @@ function visible({ visible: all = [] }) {
     scrolling(label, table(label, ["Effect", "For every shape", "For the most visible", "Unit"], rows)),
   );
 }
+
+const PARTS = [candidates, fitness, gain, where, advice, notes, visible];
 
 /** @typedef {Quantiles | { remaining_cycles?: Quantiles } | null | undefined} Answer quantiles by name, or what holds them */
 
