@@ -17,7 +17,7 @@ const SHOWN = 50;
 /** @type {Record<EventOut["state"], string>} */
 const STATES = { raised: "Not acknowledged", acknowledged: "Acknowledged", cleared: "Over" };
 
-/** @type {(place: HTMLElement, clutchId: string | null) => () => Promise<void>} reads what has changed, and draws it; `clutchId`: null for all */
+/** @type {(place: HTMLElement, clutchId: string | null) => () => Promise<void>} of all clutches where it is null */
 export function alarms(place, clutchId) {
   const wrong = h("div", { role: "status" });
   const events = h("section", { "aria-label": "Alarms" });

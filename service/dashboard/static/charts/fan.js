@@ -7,7 +7,7 @@ import { eventMarks, vertical } from "./layout.js";
 import { faint } from "./palette.js";
 import { band, lineOf, measuredPoints, titled } from "./traces.js";
 
-/** @import { DegradationItem, Measured, Receipt, RemainingLife, SeriesItem, Trajectory } from "../shared/types.js" */
+/** @import { DegradationItem, Receipt, RemainingLife, SeriesItem, Trajectory } from "../shared/types.js" */
 /** @import { Annotation, Cell, Colours, PlainTrace, Shape, Spec } from "./types.js" */
 
 /** @typedef {{ at: number, cof: number | null, remaining: SeriesItem }} Prediction made at `at` cycles, when mean COF was `cof` */
@@ -28,21 +28,20 @@ export function fan({ life, pooled, predictions, events }) {
     columns: COLUMNS,
     rows: [...measuredAndLaw(pooled, { measured: "measured", law: "law" }), ...endRows(life)],
     figure: (c) => {
-      const marks = eventMarks(events, c);
-      const safe = safeBound(life, last, c);
-      const limit = threshold === null ? { shapes: [], annotations: [] } : thresholdMarks(threshold, c);
+      const marks = [eventMarks(events, c), thresholdMarks(threshold, c), safeBound(life, last, c)];
+      const text = "%{x:,.0f} cycles<br>mean COF %{y:.4f}";
       return {
         data: [
           ...past(predictions, threshold, c),
           ...law(trajectory, life, c),
           ...endOfLife(life, threshold, c),
-          points(measured, c),
+          measuredPoints("measured", measured, { color: c.ink, text, size: 7, thickness: 1.2 }),
         ],
         layout: {
           xaxis: { ...titled("duty cycles"), range: [-0.01 * last, last] },
           yaxis: titled("mean COF"),
-          shapes: [...marks.shapes, ...limit.shapes, ...safe.shapes],
-          annotations: [...marks.annotations, ...limit.annotations, ...safe.annotations],
+          shapes: marks.flatMap(({ shapes }) => shapes),
+          annotations: marks.flatMap(({ annotations }) => annotations),
         },
       };
     },
@@ -88,8 +87,9 @@ function endRows({ criterion: { threshold_mean_cof: threshold }, end_of_life_cyc
   return Object.entries(end).map(([quantile, at]) => [name(quantile), at, threshold, null, null]);
 }
 
-/** @type {(y: number, c: Colours) => { shapes: Shape[], annotations: Annotation[] }} a dashed line with its value */
+/** @type {(y: number | null, c: Colours) => { shapes: Shape[], annotations: Annotation[] }} dashed, with its value */
 function thresholdMarks(y, c) {
+  if (y === null) return { shapes: [], annotations: [] };
   const line = { color: c.failure, width: 1.6, dash: "dash" };
   const font = { color: c.failure, size: 12 };
   const text = `threshold ${fixed(y, 4)}`;
@@ -113,12 +113,6 @@ function safeBound({ at_least: left, as_of_cycles: now, status }, last, c) {
     annotations: [{ x, y: 1, yref: "paper", yanchor: "top", xanchor: "right", text, showarrow: false, font }],
   };
 }
-
-/** @type {(measured: Measured, c: Colours) => PlainTrace} */
-const points = (measured, c) => {
-  const text = "%{x:,.0f} cycles<br>mean COF %{y:.4f}";
-  return measuredPoints("measured", measured, { color: c.ink, text, size: 7, thickness: 1.2 });
-};
 
 /**
  * Each earlier prediction as a line from mean COF when it was made to the predicted end of life.

@@ -15,19 +15,21 @@ import { faint, pressureRampOf } from "./palette.js";
 /** @type {(text: string) => { title: { text: string } }} the title of an axis */
 export const titled = (text) => ({ title: { text } });
 
-/** @param {string | Axis} axis */
+/** @typedef {string | Axis} Titled an axis, by its title where it has nothing else */
+
+/** @param {Titled} axis */
 const axisOf = (axis) => (typeof axis === "string" ? titled(axis) : axis);
 
 /**
- * A figure over one pair of axes, with events marked; an axis that has nothing else is its title.
- * @type {(x: string | Axis, y: string | Axis, events: Receipt[], traces: (c: Colours) => Trace[]) => (c: Colours) => Figure}
+ * A figure over one pair of axes, with events marked.
+ * @type {(x: Titled, y: Titled, events: Receipt[], traces: (c: Colours) => Trace[]) => (c: Colours) => Figure}
  */
 export const planar = (x, y, events, traces) => (c) => ({
   data: traces(c),
   layout: { xaxis: axisOf(x), yaxis: axisOf(y), ...eventMarks(events, c) },
 });
 
-/** @type {(x: string, y: string, z: string | Axis, traces: (c: Colours) => Trace[]) => (c: Colours) => Figure} one in 3D */
+/** @type {(x: string, y: string, z: Titled, traces: (c: Colours) => Trace[]) => (c: Colours) => Figure} one in 3D */
 export const solid = (x, y, z, traces) => (c) => ({
   data: traces(c),
   layout: { showlegend: false, scene: { xaxis: titled(x), yaxis: titled(y), zaxis: axisOf(z) } },

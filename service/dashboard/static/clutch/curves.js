@@ -11,7 +11,7 @@ import { within } from "../shared/dom.js";
 /** @import { ParameterName } from "../charts/parameters.js" */
 /** @import { Depth } from "../charts/stribeck.js" */
 /** @import { DegradationItem, Receipt, StribeckItem } from "../shared/types.js" */
-/** @import { Page } from "./clutch.js" */
+/** @import { Page, Tab } from "./clutch.js" */
 
 /** Most tests whose records the surface over cycles draws. */
 const MAX_ON_SURFACE = 9;
@@ -26,10 +26,13 @@ const DEPTHS = [
   ["states", "pressure, at several cycles"],
   ["cycles", "cycles, at one pressure"],
 ];
+/** @typedef {{ pressure?: number, run?: string, by: "state" | "pressure", over: Depth }} OfCurves */
+/** @typedef {OfCurves & { lawRun?: string, parameter: ParameterName, law: ParameterName }} Chosen */
+
 /** @type {[ParameterName, string][]} */
 const NAMES = PARAMETER_NAMES.map((key) => [key, PARAMETERS[key].title]);
 
-/** @type {(page: Page) => { show: () => Promise<void> }} */
+/** @type {(page: Page) => Tab} */
 export function curvesTab({ reader }) {
   const { name } = reader;
   const curves = new Chart({ name, id: "stribeck", title: "Stribeck curves", height: 440 });
@@ -46,7 +49,7 @@ export function curvesTab({ reader }) {
   within("parameters", ".charts").append(...below.map(({ element }) => element));
   /** @type {{ tests: StribeckItem[], items: DegradationItem[], events: Receipt[] }} */
   let answers = { tests: [], items: [], events: [] };
-  /** @type {{ pressure?: number, run?: string, lawRun?: string, by: "state" | "pressure", over: Depth, parameter: ParameterName, law: ParameterName }} */
+  /** @type {Chosen} */
   const chosen = { by: "state", over: "pressure", parameter: "static_torque_nm", law: "static_torque_nm" };
   const choose = chooser(chosen, (what) => {
     if (["pressure", "run", "by", "over"].includes(what)) drawCurves();

@@ -13,7 +13,7 @@ import { askInspection } from "./changes.js";
 import { runLink } from "./warnings.js";
 
 /** @import { Change, Receipt } from "../shared/types.js" */
-/** @import { Page } from "./clutch.js" */
+/** @import { Page, Tab } from "./clutch.js" */
 
 const PAGE = 20;
 const COLUMNS = ["When", "What", "Run", "Who", "Why"];
@@ -36,7 +36,7 @@ const ACTIONS = {
   restore_inspection: "Inspection restored",
 };
 
-/** @type {(place: HTMLElement, clutchId: string) => (runs: Receipt[]) => Promise<void>} reads as many pages as are shown */
+/** @type {(place: HTMLElement, clutchId: string) => (runs: Receipt[]) => Promise<void>} reads the pages shown */
 function auditTrail(place, clutchId) {
   const path = `${clutchPath(clutchId)}/changes`;
   let pages = 1;
@@ -91,7 +91,7 @@ function shown(value) {
     .join(", ");
 }
 
-/** @type {(page: Page) => { show: () => Promise<void>, poll: () => Promise<void> }} */
+/** @type {(page: Page) => Tab} */
 export function historyTab({ reader, done }) {
   const { name } = reader;
   const predicted = new Chart({ name, id: "predicted", title: "Remaining cycles, as predicted", wide: true });

@@ -14,12 +14,14 @@ import { BY } from "./curves.js";
 
 /** @import { LagName } from "../quantities/lag.js" */
 /** @import { DegradationItem, LoopItem, Receipt, StribeckItem } from "../shared/types.js" */
-/** @import { Page } from "./clutch.js" */
+/** @import { Page, Tab } from "./clutch.js" */
+
+/** @typedef {{ over: "state" | "pressure", pressure?: number, run?: string }} OfLoops */
 
 /** @type {[LagName, string][]} */
 const QUANTITY_OPTIONS = LAG_NAMES.map((name) => [name, QUANTITIES[name].title]);
 
-/** @type {(page: Page) => { show: () => Promise<void> }} */
+/** @type {(page: Page) => Tab} */
 export function loopsTab({ reader }) {
   const { name } = reader;
   const curves = new Chart({ name, id: "loop-curves", title: "Loops: torque over speed", wide: true, height: 420 });
@@ -31,7 +33,7 @@ export function loopsTab({ reader }) {
   let answers = { loops: [], tests: [], events: [] };
   /** @type {DegradationItem[] | null} null: not read yet */
   let lag = null;
-  /** @type {{ over: "state" | "pressure", pressure?: number, run?: string, lag: LagName, frequency?: number, lagPressure?: number }} */
+  /** @type {OfLoops & { lag: LagName, frequency?: number, lagPressure?: number }} */
   const chosen = { over: "state", lag: "loop_area" };
   const choose = chooser(chosen, (what) => {
     if (what === "lag") {

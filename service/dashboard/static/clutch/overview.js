@@ -20,9 +20,9 @@ import { heldView, warningsView } from "./warnings.js";
 
 /** @import { Content } from "../shared/dom.js" */
 /** @import { ClutchOut, CourseShare, CriterionOutcome, DegradationItem, Receipt, RemainingLife } from "../shared/types.js" */
-/** @import { Page } from "./clutch.js" */
+/** @import { Page, Tab } from "./clutch.js" */
 
-/** @type {(place: HTMLElement, page: Page) => { show: () => Promise<void>, charts: Chart[] }} `charts`: of the printed page */
+/** @type {(place: HTMLElement, page: Page) => Tab} */
 export function overviewTab(place, page) {
   const { reader } = page;
   const { name } = reader;

@@ -19,7 +19,7 @@ const PACE = "pace_cycles_per_hour";
 const SHOWN = ["0.05", "0.5", "0.95"];
 
 /** @typedef {{ input: HTMLInputElement, note: HTMLElement }} Entry what is typed, and below it what is wrong with it */
-/** @typedef {{ element: HTMLElement, legend: HTMLElement, remove: HTMLButtonElement, note: HTMLElement, entries: Entry[] }} Block */
+/** @typedef {Record<"element" | "legend" | "remove" | "note", HTMLElement> & { entries: Entry[] }} Block */
 
 /** Numbers the fields: labels need names of their own. */
 let count = 0;
@@ -138,7 +138,7 @@ export function plannedDuty(place, clutchId) {
     if (first instanceof HTMLElement) first.focus();
   }
 
-  /** @type {(life: PlannedLife) => HTMLElement | string} the other way to count, in one click, where the service assumed one */
+  /** @type {(life: PlannedLife) => HTMLElement | string} the other way to count, where the service assumed one */
   function other({ counted_by: by, warnings }) {
     const assumed = warnings.some(({ code }) => code === "counted_by_energy");
     if (!assumed && countedBy === undefined) return "";

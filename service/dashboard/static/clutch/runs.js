@@ -11,12 +11,12 @@ import { buttons } from "./warnings.js";
 import { runCharts } from "./run_view.js";
 
 /** @import { Receipt } from "../shared/types.js" */
-/** @import { Page } from "./clutch.js" */
+/** @import { Page, Tab } from "./clutch.js" */
 
 /** Runs on a page of the list. */
 const PAGE = 25;
 
-/** @type {(place: HTMLElement, page: Page) => { show: (runId: string) => Promise<void> }} `runId`: that the address opens */
+/** @type {(place: HTMLElement, page: Page) => Tab} */
 export function runsTab(place, { reader, done }) {
   let first = 0;
   /** @type {Receipt[]} the latest first */

@@ -44,7 +44,7 @@ const CODES = {
   },
 };
 
-/** @type {(warned: Warned[], tests: StribeckItem[]) => HTMLElement} what is odd about the life; one about its last test names that */
+/** @type {(warned: Warned[], tests: StribeckItem[]) => HTMLElement} what is odd about the life or its last test */
 export function warningsView(warned, tests) {
   const last = tests.filter((test) => test.fits.some((fit) => fit.mean_cof !== null)).at(-1);
   const items = [...new Set(warned.map(({ code }) => code))].map((code) => {

@@ -20,7 +20,13 @@ const NEVER_RUN = "No diagnosis has been run yet. It reads the stored runs and c
 /** @param {BeforeAndAfter | null | undefined} life remaining life under both models */
 const nowAndThen = (life) => life && lifeBars(life, ["Now", "Then"]);
 
-/** @typedef {{ path: string, name: () => string, present: () => { runs: number }, life: () => Promise<{ model: ModelName }> }} Reader of a clutch */
+/**
+ * @typedef {object} Reader of a clutch
+ * @property {string} path
+ * @property {() => string} name the start of saved files' names
+ * @property {() => { runs: number }} present
+ * @property {() => Promise<{ model: ModelName }>} life
+ */
 
 /**
  * @param {HTMLElement} place the section's body
@@ -130,7 +136,7 @@ export function diagnosisTab(place, reader, changed) {
     if (sure) await put(null, "Going back: the predictions are recomputed …", "The baseline is used again.");
   }
 
-  /** @type {(id: string | null, under: string, done: string) => Promise<void>} use the model of a diagnosis; null: the baseline */
+  /** @type {(id: string | null, under: string, done: string) => Promise<void>} of a diagnosis; null: the baseline */
   const put = (id, under, done) =>
     doing(
       under,
@@ -142,7 +148,7 @@ export function diagnosisTab(place, reader, changed) {
       done,
     );
 
-  /** @type {(under: string, work: () => Promise<void>, done?: string) => Promise<void>} what is said meanwhile, and where it went well */
+  /** @type {(under: string, work: () => Promise<void>, done?: string) => Promise<void>} said meanwhile, and at the end */
   async function doing(under, work, done = "") {
     const all = [...content.querySelectorAll("button"), run];
     for (const each of all) each.disabled = true;

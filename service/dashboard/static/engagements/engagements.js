@@ -100,7 +100,7 @@ function optionsOf(named) {
   return names.map((name) => /** @type {[Name, string]} */ ([name, named[name][0]]));
 }
 
-/** @typedef {{ id: string, name: () => string, runs: () => Promise<Receipt[]>, events: () => Promise<Receipt[]> }} Reader of a clutch */
+/** @typedef {{ id: string, name: () => string } & Record<"runs" | "events", () => Promise<Receipt[]>>} Reader of a clutch */
 
 /** @type {(place: HTMLElement, reader: Reader) => { show: () => Promise<void> }} */
 export function engagementsTab(place, reader) {

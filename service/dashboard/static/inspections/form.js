@@ -33,8 +33,8 @@ function outcomeOf({ cycles, state }) {
       );
 }
 
-/** @type {(base: string, sent: () => Promise<unknown>) => HTMLElement} `base`: the inspections' path; `sent`: hears of stored ones */
-export function inspectionForm(base, sent) {
+/** @type {(path: string, sent: () => Promise<unknown>) => HTMLElement} of the inspections; `sent` hears of stored ones */
+export function inspectionForm(path, sent) {
   const numeric = { type: "number", step: "any", inputmode: "decimal" };
   const cycles = input("cycles", { ...numeric, min: 0, required: true });
   const moment = input("performed-at", { type: "datetime-local" });
@@ -61,12 +61,12 @@ export function inspectionForm(base, sent) {
 
   const store = async () => {
     /** @type {{ body: InspectionOut }} */
-    const { body } = await sendJson("POST", base, inspection());
+    const { body } = await sendJson("POST", path, inspection());
     const refused = [];
     for (const file of photographs.files ?? []) {
       const type = { "Content-Type": file.type || "application/octet-stream" };
       try {
-        await send("POST", `${base}/${body.inspection_id}/photographs`, file, type);
+        await send("POST", `${path}/${body.inspection_id}/photographs`, file, type);
       } catch (problem) {
         refused.push(problemView(problem, `${file.name} is not stored. `));
       }

@@ -28,7 +28,7 @@ async function drawn(file) {
   return canvas;
 }
 
-/** @type {(base: string) => { element: HTMLElement, show: (inspections: InspectionOut[]) => void }} `base`: the inspections' path; shown by cycles */
+/** @param {string} base the inspections' path */
 export function gallery(base) {
   const element = h("div.row.photographs");
   /** @type {Map<string, HTMLCanvasElement>} the drawings that are shown, by path */
@@ -86,7 +86,7 @@ export function gallery(base) {
 
   return {
     element,
-    show: (inspections) => {
+    show: (/** @type {InspectionOut[]} */ inspections) => {
       visibility.disconnect();
       waiting.clear();
       element.replaceChildren(...inspections.filter(({ photographs }) => photographs.length > 0).map(state));

@@ -1,5 +1,5 @@
 // @ts-check
-// The quantities that are tracked along a life and may end it, and what is chosen of them and of their levels above charts.
+// The quantities that are tracked along a life and may end it, and what is chosen of them above charts.
 
 import { distinct } from "../charts/columns.js";
 import { PARAMETERS } from "../charts/parameters.js";

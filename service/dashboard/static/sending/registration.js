@@ -14,9 +14,10 @@ export const IDENTIFIER = {
   title: "letters, digits and . _ : @ + -",
 };
 
-/** @typedef {[path: string, label: string, value: string | number | null, attributes?: Record<string, string | number | boolean>]} Field `path`: in the record */
+/** @typedef {string | number | null} Typed */
+/** @typedef {[path: string, label: string, usual: Typed, attributes?: Record<string, Typed | boolean>]} Field of the record */
 
-/** @type {[string, Field[]][]} the form's fields, with the reference clutch's values, which the service fills in where one is left out */
+/** @type {[string, Field[]][]} with the reference clutch's values, as the service fills in what is left out */
 export const SECTIONS = [
   [
     "Geometry",
@@ -74,8 +75,8 @@ export function register(id, { similar = [], record = null, lead = "" } = {}) {
   return answered(dialog, () => result);
 }
 
-/** @type {(id: string, record: ClutchRecord | null, registered: (id: string) => void, cancel: () => void) => HTMLElement} */
-function form(id, record, registered, cancel) {
+/** @type {(id: string, record: ClutchRecord | null, done: (id: string) => void, cancel: () => void) => HTMLElement} */
+function form(id, record, done, cancel) {
   const attributes = { required: true, autocomplete: "off", autofocus: true, ...IDENTIFIER };
   const name = h("input", { id: "new-id", value: id, ...attributes });
   /** @type {[string, HTMLInputElement][]} by their place in the record */
@@ -94,7 +95,7 @@ function form(id, record, registered, cancel) {
     const chosen = name.value.trim();
     try {
       await sendJson("POST", "/v1/clutches", recordOf(chosen, inputs, record));
-      registered(chosen);
+      done(chosen);
     } catch (problem) {
       answer.replaceChildren(problemView(problem, "Not registered. "));
     }
@@ -112,7 +113,7 @@ function inputOf([path, , usual, attributes], record) {
   return h("input", { id: `new-${path.replace(".", "-")}`, ...all });
 }
 
-/** @type {(id: string, inputs: [string, HTMLInputElement][], record: ClutchRecord | null) => object} beside what the form does not show */
+/** @type {(id: string, inputs: [string, HTMLInputElement][], record: ClutchRecord | null) => object} */
 function recordOf(id, inputs, record) {
   /** @type {Record<string, any>} */
   const body = { ...record, clutch_id: id };

@@ -121,7 +121,7 @@ export function runFile(file, json, listed) {
       remark.textContent = other ? `This file names the clutch ${own}, not ${id}.` : "";
     },
 
-    /** @type {(id: string, alone: boolean) => Promise<Receipt | null>} whatever comes back is shown; `alone`: its receipt is open */
+    /** @type {(id: string, alone: boolean) => Promise<Receipt | null>} what comes back is shown, of one alone all */
     send: async (id, alone) => {
       run.progress = "sending";
       fields.disabled = true;

@@ -30,7 +30,11 @@ export function problemView(problem, lead) {
 
 /**
  * Do what a form asks for: its button rests meanwhile, and `answer` says what is under way, then what went wrong.
- * @type {(go: HTMLButtonElement, answer: HTMLElement, status: string, work: () => Promise<unknown>, lead?: string) => Promise<void>}
+ * @param {HTMLButtonElement} go
+ * @param {HTMLElement} answer
+ * @param {string} status
+ * @param {() => Promise<unknown>} work
+ * @param {string} [lead] what has not happened
  */
 export async function attempted(go, answer, status, work, lead) {
   go.disabled = true;
