@@ -385,6 +385,25 @@ def test_names_that_are_spelt_almost_alike(loaded: Callable[[str], Module]) -> N
         assert similar("similarTo", typed, ["bench3-017", "c1", "right"]) == []
 
 
+#: A list of three pages in place of the service's: what is read of it, and whether there is more.
+PAGES = """async (m) => {
+  const own = globalThis.fetch;
+  const pages = { "": [[1, 2], "b"], b: [[3], "c"], c: [[4], null] };
+  globalThis.fetch = async (address) => {
+    const [items, next] = pages[new URL(address, location.href).searchParams.get("cursor") ?? ""];
+    return new Response(JSON.stringify({ items, next }));
+  };
+  const read = [await m.readAll("/v1/list?limit=2"), await m.readAll("/v1/list", 1), await m.readAll("/v1/list", 2)];
+  globalThis.fetch = own;
+  return read.map(({ items, more }) => [items, more]);
+}"""
+
+
+def test_a_list_is_read_page_by_page_or_its_first_pages(loaded: Callable[[str], Module]) -> None:
+    read = loaded("shared/api.js").evaluate(PAGES)
+    assert read == [[[1, 2, 3, 4], False], [[1, 2], True], [[1, 2, 3], True]]
+
+
 # --- Numbers as a person reads them: ordinary values, none at all, and the edges of each rule.
 #: A function, its arguments as JSON, its text. Eight decimals at most; two digits stay however wide an interval is; no minus
 #: before nothing but zeros; a first digit of 1 is followed by a second one; a clock may be ahead.
