@@ -85,7 +85,6 @@ class ShapeParameter:
 class Felt:
     """What an amplitude without a unit of its own comes to on the rig, for the paragraph."""
 
-    name: str
     unit: str
     of: Callable[[float], float]  # of the amplitude in the effect's unit; monotonic
 
@@ -120,7 +119,7 @@ class Effect:
     prior_sd: float
     positive: bool = False  # else either sign
     scale: float = 1.0  # turns the SI amplitude into `unit`
-    felt: Felt | None = None  # how a sentence states it
+    felt: Felt | None = None  # the number that a sentence states
     shapes: tuple[ShapeParameter, ...] = ()
     # the shapes to be tried, none where the campaign cannot show the effect
     grid: Callable[[Facts], tuple[Tried, ...]] = lambda _: (Tried(shape=()),)
@@ -142,6 +141,8 @@ class Effect:
     axis: str = ""
     article: str = ""  # what stands before its name where it is the cause (`a`, `changed`)
     check: str = ""  # what to look at on the rig where it is the cause, after "Next: "
+    states: str = ""  # the size in a sentence, {} in its place
+    states_below: str = ""  # of a negative size, its amount in the place
     opposite_physics: str = ""  # a sentence for a negative amplitude, where `physics` holds for a positive one only
 
     def changes(self, scene: Scene, settings: Sequence[tuple[float, Shape]]) -> FloatArray:

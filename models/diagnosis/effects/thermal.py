@@ -96,9 +96,8 @@ OIL_TEMPERATURE = Effect(
     channels=("oil_temperature_c",),
     amplitude="viscosity exponent β (1: proportional)",
     unit="-",
-    felt=Felt(
-        name="viscous torque lost where the oil's viscosity halves", unit="%", of=lambda β: 100.0 * (1.0 - of_twice(-β))
-    ),
+    felt=Felt(unit="%", of=lambda β: 100.0 * (1.0 - of_twice(-β))),
+    states="Halving the oil's viscosity costs {} of the viscous torque.",
     prior_sd=0.7,
     positive=True,
     shapes=(
@@ -174,6 +173,7 @@ INTERFACE_HEATING = Effect(
     source="Marklund and Larsson, Tribology Int. 41 (2008) 824: friction of wet clutches by interface temperature",
     kind=Kind.ARTEFACT,
     amplitude="loss of torque at 0.32 W/mm²",
+    states="Friction loses {} at 0.32 W/mm².",
     unit="%",
     prior_sd=0.1,
     positive=True,
@@ -207,9 +207,9 @@ VISCOUS_EXPONENT = Effect(
     kind=Kind.ARTEFACT,
     amplitude="change of exponent δ",
     unit="-",
-    felt=Felt(
-        name="change of viscous torque at twice the middle speed", unit="%", of=lambda δ: 100.0 * (of_twice(δ) - 1.0)
-    ),
+    felt=Felt(unit="%", of=lambda δ: 100.0 * (of_twice(δ) - 1.0)),
+    states="Viscous torque at twice the middle speed is {} above the model's.",
+    states_below="Viscous torque at twice the middle speed is {} below the model's.",
     prior_sd=0.2,
     change=_viscous_exponent_change,
     before_lag=True,
@@ -247,6 +247,7 @@ HYDRODYNAMIC_DRAG = Effect(
     source="Kato et al., drag torque of disengaged wet clutches; Newtonian shear in an annular gap",
     kind=Kind.ARTEFACT,
     amplitude="drag at the middle speed",
+    states="The drag is {} at the middle speed.",
     unit="Nm",
     prior_sd=0.5,
     positive=True,

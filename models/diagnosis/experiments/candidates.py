@@ -120,7 +120,7 @@ TRIALS: dict[str, Trial] = {
     ),
     **{
         f"{name}_energy": Trial(
-            text=f"two more stationary tests, each after the usual use but with {name} the usual energy",
+            text=f"two more stationary tests, each after the usual cycles at {name} the energy per engagement",
             later=2,
             energy=energy,
         )

@@ -79,24 +79,25 @@ def with_unit(text: str, unit: str) -> str:
     return text if unit in {"-", ""} else f"{text} {unit}"
 
 
-def signed(estimate: Estimate, slug: str) -> str:
-    """Value with its 90 % interval, and the probability of its sign where that is not sure: said to be open where the
-    interval holds both signs."""
-    sign = None if estimate.one_sided else estimate.sign_probability
-    (low, high), name = estimate.interval, estimate.name
-    low = max(low, 0.0) if estimate.one_sided else low
-    value, unit = estimate.value, estimate.unit
-    if (felt := BY_SLUG[slug].felt) is not None:
-        name, unit = name.replace(BY_SLUG[slug].amplitude, felt.name), felt.unit
-        value, low, high = map(felt.of, (value, low, high))
-    size = f"{name}: {with_unit(number(value), unit)}"
-    if high > low:
-        size += f", 90 % interval {number(low)} to {with_unit(number(high), unit)}"
-    both_signs = estimate.interval[0] < 0.0 < estimate.interval[1]
-    if sign is None or (not both_signs and sign > 0.99):  # the interval says it
-        return size
-    way = f"{'negative' if estimate.value < 0 else 'positive'} with probability {probability(sign)}"
-    return f"{size}, the sign is open ({way})" if both_signs else f"{size}, {way}"
+def stated(estimate: Estimate, slug: str) -> str:
+    """A sentence on a size with its 90 % interval, and on its sign where that is not sure."""
+    effect, sign = BY_SLUG[slug], None if estimate.one_sided else estimate.sign_probability
+    (low, high), unit = estimate.interval, estimate.unit
+    ends = [estimate.value, max(low, 0.0) if estimate.one_sided else low, high]
+    if effect.felt is not None:
+        unit, ends = effect.felt.unit, [effect.felt.of(end) for end in ends]
+    below = high <= 0.0 and effect.states_below
+    value, low, high = (-ends[0], -ends[2], -ends[1]) if below else ends
+    aside = f"90 % interval {number(low)} to {with_unit(number(high), unit)}" if high > low else ""
+    if low < 0.0 < high and sign is not None:
+        way = "negative" if estimate.value < 0 else "positive"
+        aside += f"; the sign is open, {way} with probability {probability(sign)}"
+    elif sign is not None and sign <= 0.99:
+        aside += f"; the sign is so with probability {probability(sign)}"
+    size = with_unit(number(value), unit) + (f" ({aside})" if aside else "")
+    onset = estimate.name.partition(" (from ")[2]
+    sentence = (effect.states_below if below else effect.states).format(size)
+    return f"{sentence[:-1]}, from {onset[:-1]}." if onset else sentence
 
 
 def number(value: float) -> str:
@@ -198,9 +199,12 @@ def _detection_limits(report: Report) -> list[Sentence]:
 def _shown(visible: Visible) -> str:
     """The smallest size that shows, `a torque zero shift of 0.64 Nm`."""
     name, least, unit = _with_article(visible.effect), visible.least, visible.unit
-    if (felt := BY_SLUG[visible.effect].felt) is not None:
-        least, unit = felt.of(least), f"{felt.unit} ({felt.name})".lstrip() if unit == "-" else felt.unit
-    return f"{name} of {with_unit(number(float(f'{least:.2g}')), unit)}"
+    effect = BY_SLUG[visible.effect]
+    if effect.felt is not None:
+        least, unit = effect.felt.of(least), effect.felt.unit
+    size = with_unit(number(float(f"{least:.2g}")), unit)
+    sentence = effect.states.format(size)
+    return f"{name} of {size}" if effect.felt is None else f"{name} ({sentence[0].lower()}{sentence[1:-1]})"
 
 
 def _scatter(scatter: RunScatter | None) -> str:
@@ -226,7 +230,7 @@ def _named(report: Report) -> list[Sentence]:
             physics = effect.opposite_physics if below and effect.opposite_physics else effect.physics
             seen = [note.partition(": ")[2] for note in report.notes if note.startswith(f"{item.effect}: ")]
             sentences += [Sentence(physics, SHOULD), *(Sentence(f"Here {note}") for note in seen)]
-            sentences.append(Sentence(f"{_capitalised(signed(item.estimate, item.effect))}."))
+            sentences.append(Sentence(stated(item.estimate, item.effect)))
     companions = [
         f"{effect_name(item.effect)} (probability {probability(item.probability)})"
         for item in report.candidates
@@ -245,11 +249,10 @@ def _ambiguous(report: Report) -> list[Sentence]:
     """The explanations among which the choice is, each with its probability, what most of them hold first; what to do."""
     estimates = {candidate.effect: candidate.estimate for candidate in report.candidates}
     held = _held_by_most(report)
-    remaining = [Sentence(f"{_capitalised(signed(estimates[slug], slug))}.") for slug in held if slug in estimates]
+    remaining = [Sentence(stated(estimates[slug], slug)) for slug in held if slug in estimates]
     checks, further = _next(report)
     remaining += [*checks, *further]
-    if report.advice:
-        remaining.append(Sentence("Adopt nothing before the next diagnosis.", RATHER))
+    remaining.append(Sentence("Adopt nothing before the next diagnosis.", RATHER))
     choices = [item for item in report.explanations if item.effects in _worth_saying(report)]
     choices = [item for item in choices if set(held) <= set(item.effects)]
     # without sizes, which are in the report's fields, and with fewer alternatives where there are too many words
@@ -283,15 +286,15 @@ def _alternative(report: Report, effects: Sequence[str], held: Sequence[str], *,
     estimates = {candidate.effect: candidate.estimate for candidate in report.candidates}
     beside = [slug for slug in effects if slug not in held]
     known = [slug for slug in beside if slug in BY_SLUG and slug in estimates]
-    like = f", such as {report.resembles}" if report.resembles and not brief else ""
+    like = f", such as {report.resembles}" if report.resembles and UNCATALOGUED in beside and not brief else ""
     names = [effect_name(slug) if brief else _cause_name(slug) for slug in beside if slug != UNCATALOGUED]
-    names += [f"{_cause_name(UNCATALOGUED)}{like}"] if UNCATALOGUED in beside else []
+    names += [_cause_name(UNCATALOGUED)] if UNCATALOGUED in beside else []
     joined = " together with ".join(names)
     if held:
         joined = f"with {joined}" if names else "alone"
     share = next(item.probability for item in report.explanations if item.effects == tuple(effects))
     sizes = [] if brief else list(filter(None, (_brief_size(estimates[slug], slug) for slug in known)))
-    return f"{joined} ({'; '.join((probability(share), *sizes))})"
+    return f"{joined} ({'; '.join((probability(share), *sizes))}){like}"
 
 
 def _brief_size(estimate: Estimate, slug: str) -> str:
@@ -386,12 +389,13 @@ def _next(report: Report) -> tuple[list[Sentence], list[Sentence]]:
     if not looked_at and (best is None or best.narrows or best.nats < criteria.WORTHWHILE):  # no test is to decide
         looked_at = [_held_by_most(report), *_worth_saying(report)]
     known = ([BY_SLUG[slug].check for slug in effects if slug in BY_SLUG] for effects in looked_at)
-    checks = [Sentence(f"Next: {'; '.join(each)}.") for each in [next(filter(None, known), [])] if each]
+    checks = [Sentence(f"Next: {'. Also '.join(each)}.") for each in [next(filter(None, known), [])] if each]
     if best is None:
         no_more = "" if report.gain is None else "No further test would tell much more."
         return checks, [Sentence(no_more, SHOULD)]
     if best.narrows:
-        value = "value" if len(report.causes) == 1 else f"value of {effect_name(best.effect)}"
+        one = len(report.causes) == 1 or _held_by_most(report) == (best.effect,)
+        value = "value" if one else f"value of {effect_name(best.effect)}"
         better = f"{'For' if checks else 'Next, for'} a closer {value}: {_test(best)}"
         narrower = f"it narrows the interval by {100 * (1 - best.narrows):.0f} %"
         return checks, [Sentence(f"{better}; {narrower}.", RATHER if checks else MUST)]

@@ -17,7 +17,7 @@ from models.diagnosis.raw_records.evidence import RawEvidence
 from models.diagnosis.report.assemble import candidates_of, reason_against, report_of
 from models.diagnosis.report.maps import MOST_BINS, SHOWN, loop_traces, residual_maps
 from models.diagnosis.report.report import Report, misfit_of
-from models.diagnosis.report.summary import signed
+from models.diagnosis.report.summary import stated
 from models.diagnosis.validation.held_out import Gain
 from tests.models.diagnosis.campaigns import CYCLES, PRESSURES, SPEEDS, Study, bump, campaign, look, study
 from tests.models.diagnosis.report.test_summary import GAIN
@@ -131,7 +131,7 @@ def test_the_size_of_a_swing_has_no_sign(given: Study) -> None:
     raw = (RawEvidence(effect="shaft_ripple", log_evidence=50.0, estimate=estimate, note="it swings"),)
     found = posterior_of(given.baseline, raw)
     (ripple,) = (c for c in candidates_of(found.problem, judge(found), raw, {}) if c.effect == "shaft_ripple")
-    assert signed(ripple.estimate, "shaft_ripple") == "ripple amplitude: 0.5 Nm, 90 % interval 0.467 to 0.533 Nm"
+    assert stated(ripple.estimate, "shaft_ripple").endswith("an amplitude of 0.5 Nm (90 % interval 0.467 to 0.533 Nm).")
 
 
 # --- Residual maps against means taken row by row, NaN where nothing was measured, loops as they were measured.

@@ -120,11 +120,14 @@ def test_every_verdict_has_a_paragraph_that_is_read_once(found: Report) -> None:
     for each in found.candidates:
         felt = BY_SLUG[each.effect].felt
         unit = each.estimate.unit if felt is None else felt.unit
-        value, low, high = (x if felt is None else felt.of(x) for x in (0.3634, 0.2734, 0.4534))
+        value, low, high = (
+            f"{x if felt is None else felt.of(x):.3g} {unit}".rstrip() for x in (0.3634, 0.2734, 0.4534)
+        )
         if found.verdict is Verdict.CAUSE_NAMED:
-            assert f"{value:.3g} {unit}".rstrip() + f", 90 % interval {low:.3g} to {high:.3g} {unit}".rstrip() in said
+            size = f"{value} (90 % interval {low.removesuffix(f' {unit}')} to {high})"
+            assert BY_SLUG[each.effect].states.format(size) in said
         elif felt is None:
-            assert f" (0.33; {each.estimate.name} {value:.3g} {unit})" in said
+            assert f" (0.33; {each.estimate.name} {value})" in said
         assert each.effect.replace("_", " ") in said
 
 
@@ -133,7 +136,7 @@ def test_what_is_named_is_explained_with_its_size_its_gain_and_the_next_test() -
     said = summarise(found)
     assert "The cause is changed oil temperature (probability 0.97)." in said
     assert BY_SLUG["oil_temperature"].physics in said
-    assert "halves: 22.3 %, 90 % interval 17.3 to 27 %." in said  # 1 - 2^-0.363 and so on
+    assert "costs 22.3 % (90 % interval 17.3 to 27 %) of the viscous torque." in said  # 1 - 2^-0.363 and so on
     assert f"Next: {BY_SLUG['oil_temperature'].check}." in said
     assert "Then: stationary test with" in said
     assert (
@@ -207,23 +210,23 @@ def test_what_these_data_would_show_is_said_with_units_zero_and_pressure_first()
     ) in said
     assert "These data cannot show, at any size: channel delay and stick slip." in said
     said = summarise(replace(found, visible=(visible("oil_temperature", 4.0),)))
-    assert "changed oil temperature of 62 % (viscous torque lost where the oil's viscosity halves); a fault" in said
+    assert "changed oil temperature (halving the oil's viscosity costs 62 % of the viscous torque); a fault" in said
     one_form = replace(visible("pressure_offset", 3.0), amplitude=0.1, least=0.1)
     assert "would have found a pressure offset of 0.1 bar." in summarise(replace(found, visible=(one_form,)))
 
 
-def sized(interval: tuple[float, float], sign: float) -> str:
-    """The paragraph on a shifted zero of 3.06 ± 3.16 Nm of this interval."""
+def sized(interval: tuple[float, float], sign: float, value: float = 3.06) -> str:
+    """The paragraph on a shifted zero of so many ± 3.16 Nm of this interval."""
     found = findings(Verdict.CAUSE_NAMED, "torque_zero_shift")
-    estimate = replace(found.candidates[0].estimate, value=3.06, sd=3.16, stated_interval=interval, stated_sign=sign)
+    estimate = replace(found.candidates[0].estimate, value=value, sd=3.16, stated_interval=interval, stated_sign=sign)
     return summarise(replace(found, candidates=(replace(found.candidates[0], estimate=estimate),)))
 
 
 def test_a_size_and_the_words_on_its_sign_agree() -> None:
-    said = sized((0.972, 9.23), 0.995)
-    assert "3.06 Nm, 90 % interval 0.972 to 9.23 Nm." in said
-    assert "0.1 to 9.23 Nm, positive with probability 0.97" in sized((0.1, 9.23), 0.97)
-    assert "the sign is open (positive with probability 0.55)" in sized((-4.2, 6.49), 0.55)
+    assert "It reads 3.06 Nm (90 % interval 0.972 to 9.23 Nm) too much." in sized((0.972, 9.23), 0.995)
+    assert "0.1 to 9.23 Nm; the sign is so with probability 0.97) too much." in sized((0.1, 9.23), 0.97)
+    assert "to 6.49 Nm; the sign is open, positive with probability 0.55) too much." in sized((-4.2, 6.49), 0.55)
+    assert "It reads 3.06 Nm (90 % interval 1 to 4 Nm) too little." in sized((-4.0, -1.0), 0.995, value=-3.06)
 
 
 def test_no_sentence_stands_twice() -> None:
@@ -286,7 +289,7 @@ def test_a_pair_is_looked_at_and_adopted_in_the_plural() -> None:
     said = summarise(replace(found, extension=Extension(effects=found.causes, content={}), candidates=()))
     assert "If that confirms them, adopt them: measurements are then corrected and later tests" in said
     checks = [BY_SLUG[slug].check for slug in found.causes]
-    assert f"Next: {checks[0]}; {checks[1]}." in said
+    assert f"Next: {checks[0]}. Also {checks[1]}." in said
 
 
 def test_an_error_as_large_as_noise_is_not_called_correlated_along_cycles() -> None:
@@ -364,10 +367,10 @@ def test_any_amplitude_can_be_written():
     found = findings(Verdict.CAUSE_NAMED, "oil_change")
     for _ in range(300):
         value, sd = rng.choice([-1, 1]) * 10 ** rng.uniform(-12, 12), 10 ** rng.uniform(-12, 12)
-        estimate = Estimate(name="step of C_v", value=value, sd=float(rng.choice([0.0, sd])), unit="%")
+        estimate = Estimate(name="step", value=value, sd=float(rng.choice([0.0, sd])), unit="%")
         said = summarise(replace(found, candidates=(replace(found.candidates[0], estimate=estimate),)))
-        told = re.search(r"Step of C_v: (-?[\d.,e+-]+)", said.replace("−", "-"))
-        number = float(told.group(1).replace(",", "").rstrip("."))
+        way, told = re.search(r"stepped (up|down) by (-?[\d.,e+-]+)", said.replace("−", "-")).groups()
+        number = float(told.rstrip(".").replace(",", "")) * (1 if way == "up" else -1)
         assert abs(number - value) <= max(0.006 * abs(value), 0.06 * estimate.sd)
 
 
@@ -376,7 +379,7 @@ def test_a_torque_that_is_ahead_is_not_called_delayed():
     ahead = replace(found.candidates[0], estimate=replace(found.candidates[0].estimate, value=-0.012, sd=0.002))
     said = summarise(replace(found, candidates=(ahead,)))
     assert "Torque is ahead of the speed" in said
-    assert "−0.012 ms, 90 % interval −0.0153 to −0.00871 ms" in said
+    assert "Torque is recorded 0.012 ms (90 % interval 0.00871 to 0.0153 ms) before speed." in said
     assert BY_SLUG["channel_delay"].physics not in said
     late = summarise(found)
     assert BY_SLUG["channel_delay"].physics in late
