@@ -127,9 +127,9 @@ def test_what_begins_at_a_state_is_no_oil_change(planted, wanted: Alternative) -
 def test_the_paragraph_says_from_when_on_an_effect_is_at_work() -> None:
     report = look(campaign(7, dragging, loops=False))
     assert report.causes == ("hydrodynamic_drag",)
-    assert "Drag in mid speed (from about " in report.summary
+    assert "at the middle speed, from about " in report.summary
     (onset,) = {effect["shape"][-1] for draw in report.extension.content["draws"] for effect in draw["effects"]}
-    assert f"(from about {onset:,.0f} cycles on)" in report.summary
+    assert f", from about {onset:,.0f} cycles on." in report.summary
 
 
 @pytest.mark.parametrize("slug", ["hydrodynamic_drag", "squeeze_film", "gain_with_clock"])
