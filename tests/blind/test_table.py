@@ -45,8 +45,11 @@ def test_one_who_knows_meets_every_target_and_one_misled_does_not() -> None:
     assert all(f"| `{slug}` | 4 | 4/4 | 4/4 | 4/4 | 4/4 | 0/4 | 0/4 |" in "\n".join(lines) for slug in CATALOGUED)
     assert all(f"| `{slug}` | 2, 0 of 2 | 2, 0 of 2 |" in "\n".join(lines) for slug in CATALOGUED)
     assert all(f"| {slug.replace('_', ' ')} | 2 | 2 | 2 | 2 | 0 |" in "\n".join(lines) for slug in OUTSIDE)
-    assert len({trial.seed for trial in made}) == len(made)
-    assert {trial.seed for trial in made}.isdisjoint(trial.seed for trial in trials(2, 0.1))
+    whole = trials(1)
+    assert sum(trial.row.startswith("none/") for trial in whole) == 390
+    assert all(sum(trial.row == f"one/{slug}" for trial in whole) == 40 for slug in CATALOGUED)
+    assert len({trial.seed for trial in whole}) == len(whole)
+    assert {trial.seed for trial in whole}.isdisjoint(trial.seed for trial in trials(2))
 
 
 def test_what_cannot_be_made_is_an_outcome_that_counts_nowhere(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -9,13 +9,16 @@ from hypothesis import strategies as st
 from scipy.signal import cont2discrete, lfilter
 
 from models.arrays import FloatArray
+from models.friction.identification import fit_curves, mean_torques
 from models.records.plateaus import PlateauCut, cut_plateaus
-from models.records.runs import Record
+from models.records.runs import Plateaus, Record, curves_by_pressure
 from tests.models.records.raw_records import (
+    GEOMETRY,
     RPM,
     SPEEDS,
     Made,
     Sensors,
+    harmed,
     jitter,
     lose,
     make,
@@ -188,6 +191,21 @@ def test_drift_is_reported():
     torque = 20 + 0.05 * np.sin(t) + 0.003 * t + 0.02 * rng.standard_normal(t.size)
     cut = cut_plateaus(Record(time=t, pressure=np.full(6000, 5e5), speed=np.full(6000, 90.0), torque=torque))
     assert abs(cut.drift[0] - 0.003) < 4 * cut.drift_sd[0] + 5e-4
+
+
+@pytest.mark.parametrize("harm", ["none", "gap", "all"])
+def test_the_fits_are_those_of_the_exact_plateaus(harm: str) -> None:
+    """Means over the fitted curves differ by less than five stated deviations, and by 0.1 % of the torque."""
+    rng = np.random.default_rng(19)
+    made = make(*protocol(rng, SPEEDS[::3]), rng, tau=0.3, dwell=4.0)
+    cut = cut_plateaus(harmed(made.record, harm, rng))
+    exact = curves_by_pressure(Plateaus(pressure=made.pressure, speed=made.speed, torque=made.torque), GEOMETRY)
+    fits = fit_curves(curves_by_pressure(cut.plateaus, GEOMETRY))
+    assert [fit.pressure for fit in fits] == [one.pressure for one in exact]
+    velocities = GEOMETRY.sliding_velocity(SPEEDS)
+    told = mean_torques(fits, velocities)
+    truth = mean_torques(fit_curves(exact), velocities)
+    assert (np.abs(told[:, 0] - truth[:, 0]) < np.minimum(5 * told[:, 1], 0.02)).all()
 
 
 def plain(n: int = 5000, **changes) -> Record:

@@ -484,7 +484,7 @@ GIVEN: dict[str, tuple[str, dict[str, Any], dict[str, Any], list[str]]] = {
     "the second of two tables": (TWO_TABLES, {"table": "2"}, {"torque_nm": [2]}, []),
     "thousands, by the option a decimal comma": (THOUSANDS, {"decimal": ","}, {"speed_rpm": [800, 1100]}, []),
     "thousands, by the option a decimal point": (THOUSANDS, {"decimal": "."}, {"speed_rpm": [800, 1.1]}, []),
-    "fractions of a day": (DAYS, {"mapping": "time_s:Time [d]"}, {"speed_rpm": range(100, 100 + ROWS)}, []),
+    "fractions of a day": (DAYS, {"mapping": "time_s:Time [d]"}, {"time_s": 28512 + np.arange(ROWS)}, []),
     "fractions of the second beside it": (
         "Time;ms;p [bar];n [rpm];M [Nm]\n" + "".join(
             f"08:00:0{k // 4};{k % 4 * 250};{line}\n" for k, line in enumerate(rows(";", names=PLATEAUS).splitlines())),
@@ -509,6 +509,8 @@ def test_a_text_gives_what_it_is_asked_for(tmp_path: Path, name: str) -> None:
     read = read_content(tmp_path, content, **asked)
     assert [notice.code for notice in read.notices] == codes
     assert read.columns.keys() == expected.keys() or len(expected) == 1
+    if codes == ["parts_of_seconds"]:
+        assert "the fractions in ms were added" in read.notices[0].message
     for channel, values in expected.items():
         np.testing.assert_allclose(read.columns[channel], values, rtol=1e-9, atol=0, err_msg=channel)
 

@@ -21,7 +21,7 @@ RUNS = "/v1/clutches/c{}/runs"
     "everywhere", [False, pytest.param(True, marks=pytest.mark.slow)], ids=["the service", "all its processes"]
 )
 def test_a_stop_amid_posts_ends_with_0_and_finishes_what_was_on_its_way(tmp_path: Path, everywhere: bool) -> None:
-    """Six rigs post as fast as they can, each to a clutch of its own; what was answered 201 is there after the next start,
+    """Six rigs post as fast as they can, two to each of three clutches; what was answered 201 is there after the next start,
     and nothing is refused."""
     server = Server(tmp_path / "a.db")
     server.start()
@@ -30,15 +30,15 @@ def test_a_stop_amid_posts_ends_with_0_and_finishes_what_was_on_its_way(tmp_path
 
     def post(rig: int) -> None:
         with httpx2.Client(base_url=server.url, timeout=30) as http:
-            for number in range(500):
+            for number in range(300):
                 body = stationary(100.0 * number + rig, run_id=f"rig{rig}-{number}")
                 asked.add(body["run_id"])
                 try:
-                    answers[body["run_id"]] = http.post(RUNS.format(rig), json=body).status_code
+                    answers[body["run_id"]] = http.post(RUNS.format(rig % 3), json=body).status_code
                 except httpx2.TransportError:  # it takes no more connections
                     return
 
-    for number in range(6):
+    for number in range(3):
         assert ONCE.post(f"{server.url}/v1/clutches", json={"clutch_id": f"c{number}"}).status_code == 201
     rigs = [threading.Thread(target=post, args=(number,)) for number in range(6)]
     for rig in rigs:
@@ -55,10 +55,10 @@ def test_a_stop_amid_posts_ends_with_0_and_finishes_what_was_on_its_way(tmp_path
     assert set(answers.values()) == {201}
     assert on_their_way, "nothing was on its way"
     assert on_their_way <= answers.keys()
-    assert len(answers) < 3000, "it was not stopped"
+    assert len(answers) < 1800, "it was not stopped"
     server.loaded = True
     server.start()
-    pages = [ONCE.get(f"{server.url}{RUNS.format(number)}?limit=1000").json()["items"] for number in range(6)]
+    pages = [ONCE.get(f"{server.url}{RUNS.format(number)}?limit=1000").json()["items"] for number in range(3)]
     stored = {item["run_id"] for items in pages for item in items}
     assert server.stop() == 0
     assert answers.keys() <= stored

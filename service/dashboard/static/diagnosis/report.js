@@ -85,7 +85,7 @@ export function sentence(diagnosis) {
   const sure = certain(diagnosis);
   const verdict = sure.length > 0 ? "cause_named" : diagnosis.verdict;
   const names = (sure.length > 0 ? sure : (diagnosis.causes ?? [])).map((cause) =>
-    cause === "uncatalogued" ? "something that is not in the catalogue" : words(cause).toLowerCase(),
+    cause === "uncatalogued" ? "an unknown cause" : words(cause).toLowerCase(),
   );
   const last = names.at(-1) ?? "the named cause";
   const between = verdict === "cause_ambiguous" ? "or" : "and";

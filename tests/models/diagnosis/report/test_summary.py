@@ -154,6 +154,11 @@ def test_what_adoption_does_is_said_once_the_cause_is_confirmed() -> None:
         assert "No further test would tell much more." in said
     no_better = summarise(replace(found, extension=Extension(effects=("oil_change",), content={}), gain=NO_BETTER))
     assert "adopting it is of little use: later tests are predicted no better." in no_better
+    tested = replace(findings(Verdict.CAUSE_NAMED, "oil_change"), gain=NO_BETTER, candidates=())
+    assert "Then: " not in summarise(replace(tested, extension=Extension(effects=("oil_change",), content={})))
+    mixed = Extension(effects=("oil_change", "torque_zero_shift"), content={})
+    said = summarise(replace(findings(Verdict.CAUSE_NAMED, *mixed.effects), extension=mixed, candidates=()))
+    assert "measurements are then corrected, the predicted remaining life then includes oil change and later" in said
     assert "adopt" not in summarise(replace(found, extension=None))
 
 
@@ -262,7 +267,7 @@ def test_a_certain_cause_with_sized_companions_keeps_to_the_words() -> None:
     )
     advice = replace(found.advice[0], key=LONG, steps=(SWEEP, SWING), narrows=0.44)
     found = replace(found, explanations=explanations_of(beside), candidates=stated)
-    said = summarise(replace(found, advice=(advice,), not_adoptable=WHY))
+    said = summarise(replace(found, advice=(advice,)))
     assert len(said.split()) <= MAX_WORDS
     assert "pressure offset" in said
     assert "torque zero shift" in said
@@ -276,7 +281,28 @@ def test_a_test_of_many_words_is_put_into_a_short_line_with_its_time() -> None:
         advice = replace(found.advice[0], key=LONG, steps=steps, narrows=0.3)
         test = f"{TRIALS[LONG].brief} ({lasts} in all, steps in the plan); it narrows the interval by 70 %."
         assert f"For a closer value: {test}" in summarise(replace(found, advice=(advice,)))
+    assert TRIALS[LONG].brief == "stationary and dynamic tests at usual and low pressures, some with the oil at 60 °C"
     assert all(trial.brief or len(trial.text.split()) <= 22 for trial in TRIALS.values())
+    assert not any(
+        trial.brief for trial in TRIALS.values() if trial.rest or trial.later
+    )  # use and rest are always said
+
+
+def test_what_a_test_decides_and_how_surely() -> None:
+    found = findings(Verdict.CAUSE_AMBIGUOUS, "oil_change", "running_in")
+    shares = {("oil_change",): 0.6, ("oil_change", "running_in"): 0.3, ("oil_change", UNCATALOGUED): 0.1}
+    held = replace(found, explanations=explanations_of(shares))
+    said = summarise(held)
+    assert "An oil change is at work (probability above 0.99): alone (0.60)," in said
+    assert "or with others (0.10)." in said
+    assert "It decides with probability 0.80 whether unfinished running in is at work." in said
+    assert "Viscous friction stepped up by 0.363 % (" in said
+    assert said.endswith("Adopt nothing before the next diagnosis.")
+    (test,) = found.advice
+    said = summarise(replace(held, advice=(replace(test, nats=0.01),)))
+    assert f"Next: {BY_SLUG['oil_change'].check}. Most helpful, though unlikely to decide: stationary test with" in said
+    said = summarise(replace(held, advice=(replace(test, effect="running_in", other="baseline"),)))
+    assert "whether unfinished running in is at work." in said
 
 
 def test_nothing_is_asked_of_an_unknown_axis() -> None:
@@ -357,6 +383,9 @@ def test_of_many_alternatives_those_that_hold_nine_tenths_are_told_and_the_rest_
     assert said.count("(0.08") == 12
     assert "or others (0.08)." in said
     assert len(said.split()) <= MAX_WORDS
+    assert (
+        summarise(findings(Verdict.CAUSE_AMBIGUOUS, *slugs)).count("(0.08") == 8
+    )  # with sizes, there are too many words
 
 
 # --- How the size of an effect is written, whatever it is.
