@@ -14,6 +14,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from models.arrays import FloatArray
+from models.diagnosis import criteria
 from models.diagnosis.design.autocorrelation import Correlation, arma
 from models.diagnosis.design.design import Design, IntArray
 
@@ -59,7 +60,8 @@ def _filter(blocks: FloatArray, correlation: Correlation) -> None:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Gains:
-    """Whitened torque of each curve of each run: R runs, k curves of a run at most. A curve reaches into the rows after it,
+    """Whitened torque of each curve of each run: R runs, k curves of a run at most (neighbours share a gain beyond
+    MOST_GAINS). A curve reaches into the rows after it,
     as noise does: with whitened torque cut at its ends, gains of 0.25 % on a rig of 0.1 % of noise passed for structure."""
 
     curve: IntArray  # [N] of the row, among all R k
@@ -73,41 +75,39 @@ class Gains:
 
 def gains_of(design: Design, torque: FloatArray, noise: Noise) -> Gains:
     """The gains' directions for the predicted torque [N] Nm."""
-    run = design.rows.run
-    first = np.full(int(run.max()) + 1, design.curve.max())
-    np.minimum.at(first, run, design.curve)
-    place = design.curve - first[run]  # curves are numbered run by run
+    run, runs = design.rows.run, int(design.rows.run.max()) + 1
+    pairs = np.unique(np.stack([run, design.curve]), axis=1)[0]  # curves are numbered run by run, by pressure
+    own = np.bincount(pairs, minlength=runs)
+    place = design.curve - (np.cumsum(own) - own)[run]
+    place = place * np.minimum(own, criteria.MOST_GAINS)[run] // own[run]
     count = int(place.max()) + 1
     white = whitened(np.where(place[:, None] == np.arange(count), torque[:, None], 0.0), design, noise)
     row, column = np.nonzero(white)
-    directions = csr_array(
-        (white[row, column], (run[row] * count + column, row)), shape=(first.size * count, torque.size)
-    )
-    overlaps = np.stack([white[run == number].T @ white[run == number] for number in range(first.size)])
+    directions = csr_array((white[row, column], (run[row] * count + column, row)), shape=(runs * count, torque.size))
+    overlaps = np.stack([white[run == number].T @ white[run == number] for number in range(runs)])
     return Gains(curve=run * count + place, directions=directions, overlaps=overlaps)
 
 
-def modes(overlaps: FloatArray, run_gain: float, curve_gain: float) -> tuple[FloatArray, FloatArray]:
-    """Combinations T [R, k, j] of the curves' directions D that scatter independently of each other, and their sizes s
-    [R, j]: with K = σ_c² + σ_g² 11ᵀ of a run's curves, D K Dᵀ = D T Tᵀ Dᵀ and Tᵀ DᵀD T = s."""
-    count = overlaps.shape[-1]
+def scatter_root(curves: int, run_gain: float, curve_gain: float) -> FloatArray:
+    """Root [k, j] of the covariance K = σ_c² + σ_g² 11ᵀ of the gains of a run's curves; one column without σ_c."""
     if curve_gain == 0.0:
-        return np.full((*overlaps.shape[:2], 1), run_gain), run_gain**2 * overlaps.sum(axis=(1, 2))[:, None]
-    alike = (np.hypot(curve_gain, np.sqrt(count) * run_gain) - curve_gain) / count
-    root = curve_gain * np.eye(count) + alike
-    sizes, vectors = np.linalg.eigh(root @ overlaps @ root)
-    return root @ vectors, np.maximum(sizes, 0.0)
-
-
-def without_gains(columns: FloatArray, gains: Gains, run_gain: float, curve_gain: float) -> FloatArray:
-    """Whitened columns [N, m] with the scatter of the gains [-] whitened as well: (1 + U Uᵀ)^{-1/2} with U = D T."""
-    combined, sizes = modes(gains.overlaps, run_gain, curve_gain)
-    root = np.sqrt(1 + sizes)
-    removed = combined @ ((combined.mT @ gains.along(columns)) / (root * (1 + root))[..., None])
-    return np.asarray(columns - gains.directions.T @ removed.reshape(-1, columns.shape[1]), dtype=np.float64)
+        return np.full((curves, 1), run_gain)
+    alike = (np.hypot(curve_gain, np.sqrt(curves) * run_gain) - curve_gain) / curves
+    return np.asarray(curve_gain * np.eye(curves) + alike, dtype=np.float64)
 
 
 def whitening(design: Design, torque: FloatArray, noise: Noise) -> Callable[[FloatArray], FloatArray]:
-    """V^{-1/2} of columns [N, m], gains taken along a torque [N] Nm."""
+    """V^{-1/2} of columns [N, m], gains taken along a torque [N] Nm: (1 + B Bᵀ)^{-1/2} with B = D K^{1/2} of the whitened
+    directions D."""
     gains = gains_of(design, torque, noise)
-    return lambda columns: without_gains(whitened(columns, design, noise), gains, noise.run_gain, noise.curve_gain)
+    root = scatter_root(gains.overlaps.shape[-1], noise.run_gain, noise.curve_gain)
+    sizes, vectors = np.linalg.eigh(root.T @ gains.overlaps @ root)
+    sizes, combined = np.sqrt(1.0 + np.maximum(sizes, 0.0)), root @ vectors
+    shrink = (combined / (sizes * (1.0 + sizes))[:, None, :]) @ combined.mT
+
+    def white(columns: FloatArray) -> FloatArray:
+        columns = whitened(columns, design, noise)
+        removed = (shrink @ gains.along(columns)).reshape(-1, columns.shape[1])
+        return np.asarray(columns - gains.directions.T @ removed, dtype=np.float64)
+
+    return white

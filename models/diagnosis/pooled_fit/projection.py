@@ -25,7 +25,7 @@ from scipy.special import log_softmax, logsumexp
 
 from models.arrays import FloatArray
 from models.diagnosis import criteria
-from models.diagnosis.noise.covariance import Noise, gains_of, modes, whitened
+from models.diagnosis.noise.covariance import Noise, gains_of, scatter_root, whitened
 from models.diagnosis.pooled_fit.gauss_newton import Fit, prior_gram, sensitivities
 from models.diagnosis.pooled_fit.problem import FitProblem
 
@@ -41,10 +41,11 @@ class Gram:
 
     def with_gains(self, run_gain: float, curve_gain: float) -> tuple[FloatArray, float]:
         """The matrix with gains that scatter so, and the log determinant of what they add [nats, twice]."""
-        combined, sizes = modes(self.overlaps, run_gain, curve_gain)
-        removed = (combined.mT @ self.along) / np.sqrt(1 + sizes)[..., None]
-        removed = removed.reshape(-1, self.matrix.shape[1])
-        return self.matrix - removed.T @ removed, float(np.log1p(sizes).sum())
+        root = scatter_root(self.overlaps.shape[-1], run_gain, curve_gain)
+        factor = np.linalg.cholesky(np.eye(root.shape[1]) + root.T @ self.overlaps @ root)
+        removed = np.linalg.solve(factor, root.T @ self.along).reshape(-1, self.matrix.shape[1])
+        added = 2.0 * np.log(np.diagonal(factor, axis1=1, axis2=2)).sum()
+        return self.matrix - removed.T @ removed, float(added)
 
     def covariance(self, run_gain: float, curve_gain: float) -> FloatArray:
         """[base, base] of all that the baseline has free, with gains that scatter so."""
@@ -191,6 +192,7 @@ def without_likely_gains(problem: FitProblem, fitted: Fit) -> FloatArray:
     noise = problem.noise
     gains = gains_of(problem.design, fitted.torque, noise)
     white = whitened(fitted.residual[:, None], problem.design, noise)
-    combined, sizes = modes(gains.overlaps, noise.run_gain, noise.curve_gain)
-    likeliest = combined @ ((combined.mT @ gains.along(white)) / (1 + sizes)[..., None])
+    root = scatter_root(gains.overlaps.shape[-1], noise.run_gain, noise.curve_gain)
+    scattered = np.eye(root.shape[1]) + root.T @ gains.overlaps @ root
+    likeliest = root @ np.linalg.solve(scattered, root.T @ gains.along(white))
     return np.asarray(fitted.residual - fitted.torque * likeliest.ravel()[gains.curve], dtype=np.float64)

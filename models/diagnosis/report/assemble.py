@@ -26,7 +26,7 @@ from models.diagnosis.raw_records.evidence import RawEvidence
 from models.diagnosis.report.isolability import unseen_of, visible_of
 from models.diagnosis.report.maps import loop_traces, residual_maps
 from models.diagnosis.report.report import Candidate, Report, misfit_of
-from models.diagnosis.report.summary import effect_name, number, summarise, with_unit
+from models.diagnosis.report.summary import effect_name, number, size_of, summarise
 from models.diagnosis.validation.held_out import Gain
 
 
@@ -112,10 +112,10 @@ def reason_against(gain: Gain | None, sizes: Sizes) -> str:
     for slug, size in sizes.by_slug.items():
         if size.other_sign > criteria.SIGN_UNDETERMINED:
             effect = BY_SLUG[slug]
-            low, high = (number(effect.scale * end) for end in size.interval)
+            low, high = (size_of(slug, effect.scale * end, effect.unit) for end in size.interval)
             sentences.append(
                 f"Not to be adopted: not even the sign of {effect_name(slug)} is sure (wrong with probability "
-                f"{size.other_sign:.2f}; 90 % interval {low} to {with_unit(high, effect.unit)})."
+                f"{size.other_sign:.2f}; 90 % interval {low.partition(' ')[0]} to {high})."
             )
     return " ".join(sentences)
 

@@ -4,6 +4,7 @@ Sentences in the order in which one would ask, of MAX_WORDS words at most: where
 left out. The numbers behind them are the report's fields.
 """
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -81,23 +82,32 @@ def with_unit(text: str, unit: str) -> str:
 
 def stated(estimate: Estimate, slug: str) -> str:
     """A sentence on a size with its 90 % interval, and on its sign where that is not sure."""
-    effect, sign = BY_SLUG[slug], None if estimate.one_sided else estimate.sign_probability
-    (low, high), unit = estimate.interval, estimate.unit
-    ends = [estimate.value, max(low, 0.0) if estimate.one_sided else low, high]
-    if effect.felt is not None:
-        unit, ends = effect.felt.unit, [effect.felt.of(end) for end in ends]
-    below = high <= 0.0 and effect.states_below
-    value, low, high = (-ends[0], -ends[2], -ends[1]) if below else ends
-    aside = f"90 % interval {number(low)} to {with_unit(number(high), unit)}" if high > low else ""
-    if low < 0.0 < high and sign is not None:
-        way = "negative" if estimate.value < 0 else "positive"
-        aside += f"; the sign is open, {way} with probability {probability(sign)}"
-    elif sign is not None and sign <= 0.99:
-        aside += f"; the sign is so with probability {probability(sign)}"
-    size = with_unit(number(value), unit) + (f" ({aside})" if aside else "")
-    onset = estimate.name.partition(" (from ")[2]
+    effect, (name, _, onset) = BY_SLUG[slug], estimate.name.partition(" (from ")
+    if estimate.value == 0.0:  # nothing was fitted
+        return "Its size was not estimated."
+    lowest = 0.0 if estimate.one_sided else -math.inf
+    value, low, high = (max(end, lowest) for end in (estimate.value, *estimate.interval))
+    below = value < 0.0 and bool(effect.states_below)
+    if below:
+        value, low, high = -value, -high, -low
+    size, ends = size_of(slug, value, estimate.unit), [size_of(slug, end, estimate.unit) for end in (low, high)]
+    sign = None if estimate.one_sided else estimate.sign_probability
+    unsure = sign is not None and (low < 0.0 < high or sign <= 0.99)
+    interval = f"90 % interval {ends[0].partition(' ')[0]} to {ends[1]}" if high > low else ""
+    aside = "; ".join(
+        filter(None, (interval, f"this sign has probability {probability(sign or 0.0)}" if unsure else ""))
+    )
+    size += f" ({aside})" if aside else ""
     sentence = (effect.states_below if below else effect.states).format(size)
+    if estimate.unit != effect.unit:  # another quantity, as of a transient in a raw record
+        sentence = f"{_capitalised(name)}: {size}."
     return f"{sentence[:-1]}, from {onset[:-1]}." if onset else sentence
+
+
+def size_of(slug: str, value: float, unit: str) -> str:
+    """A size as a sentence gives it, with its unit."""
+    felt = BY_SLUG[slug].felt
+    return with_unit(number(value), unit) if felt is None else with_unit(number(felt.of(value)), felt.unit)
 
 
 def number(value: float) -> str:
@@ -105,7 +115,7 @@ def number(value: float) -> str:
     if 100 <= abs(value) < 1e6:
         return _signed(f"{value:,.0f}")
     if value == 0 or 1e-6 <= abs(value) < 100:
-        return _signed(np.format_float_positional(float(f"{value:.3g}"), trim="-"))
+        return _signed(np.format_float_positional(float(f"{value:.3g}") + 0.0, trim="-"))  # no -0
     return f"{value:.2e}"
 
 
@@ -187,9 +197,11 @@ def _detection_limits(report: Report) -> list[Sentence]:
     if first:
         sizes = listed([_shown(visible) for visible in first], "or")
         shown = f"Nine times in ten, these tests would have found {sizes}"
-        hidden = "; a fault that starts late or grows slowly must be larger"
-        creeps = any(v.amplitude > 1.5 * v.least for v in first)
-        sentences = [Sentence(f"{shown}{hidden if creeps else ''}.", RATHER)]
+        if any(v.amplitude > 1.5 * v.least for v in first):
+            shown += "; a fault that starts late or grows slowly must be larger"
+        if any(math.isinf(v.amplitude) for v in first):
+            shown += ", or may not show at all"
+        sentences = [Sentence(f"{shown}.", RATHER)]
     if report.unseen:
         names = listed([effect_name(slug) for slug in report.unseen])
         sentences.append(Sentence(f"These data cannot show, at any size: {names}.", SHOULD))
@@ -246,9 +258,9 @@ def _named(report: Report) -> list[Sentence]:
 
 
 def _ambiguous(report: Report) -> list[Sentence]:
-    """The explanations among which the choice is, each with its probability, what most of them hold first; what to do."""
+    """The explanations among which the choice is, each with its probability, what is certain first; what to do."""
     estimates = {candidate.effect: candidate.estimate for candidate in report.candidates}
-    held = _held_by_most(report)
+    held = _certain(report)
     remaining = [Sentence(stated(estimates[slug], slug)) for slug in held if slug in estimates]
     checks, further = _next(report)
     remaining += [*checks, *further]
@@ -270,15 +282,10 @@ def _ambiguous(report: Report) -> list[Sentence]:
     return sentences
 
 
-def _held_by_most(report: Report) -> tuple[str, ...]:
-    """The causes that are SURE to be at work, else the one that is in several explanations and LIKELY."""
-    shares, near = probabilities_by_slug(report.explanations), _worth_saying(report)
-    sure = tuple(slug for slug in report.causes if shares.get(slug, 0.0) >= criteria.SURE)
-    if sure:
-        return sure
-    often = [slug for slug in report.causes if slug in BY_SLUG and sum(slug in effects for effects in near) > 1]
-    likeliest = max(often, key=lambda slug: shares.get(slug, 0.0), default="")
-    return (likeliest,) if shares.get(likeliest, 0.0) >= criteria.LIKELY else ()
+def _certain(report: Report) -> tuple[str, ...]:
+    """The causes that are SURE to be at work."""
+    shares = probabilities_by_slug(report.explanations)
+    return tuple(slug for slug in report.causes if shares.get(slug, 0.0) >= criteria.SURE)
 
 
 def _alternative(report: Report, effects: Sequence[str], held: Sequence[str], *, brief: bool) -> str:
@@ -304,7 +311,8 @@ def _brief_size(estimate: Estimate, slug: str) -> str:
     if unknown or BY_SLUG[slug].felt is not None:
         return ""
     size = with_unit(number(estimate.value), estimate.unit)
-    return size if estimate.name in effect_name(slug) else f"{estimate.name} {size}"
+    name = estimate.name.partition(" (from ")[0]
+    return size if name in effect_name(slug) else f"{name} {size}"
 
 
 def _worth_saying(report: Report) -> list[tuple[str, ...]]:
@@ -325,8 +333,7 @@ def _open(report: Report, sure: Sequence[str], alternatives: Sequence[str]) -> S
         first = "Explanations that remain, with their probabilities"
         return Sentence(f"The data {disagree}. {first}: {listed(alternatives, 'or')}.")
     share = sum(item.probability for item in report.explanations if set(sure) <= set(item.effects))
-    verb = "is" if len(sure) == 1 else "are"
-    verb += " at work" if share >= criteria.SURE else " probably at work"
+    verb = "is at work" if len(sure) == 1 else "are at work"
     names_in_words = f"{listed([_with_article(slug) for slug in sure])} {verb} (probability {probability(share)})"
     return Sentence(f"{_capitalised(names_in_words)}: {listed(alternatives, 'or')}.")
 
@@ -387,14 +394,14 @@ def _next(report: Report) -> tuple[list[Sentence], list[Sentence]]:
     looked_at = [report.causes] if report.verdict is Verdict.CAUSE_NAMED else []
     best = report.advice[0] if report.advice else None
     if not looked_at and (best is None or best.narrows or best.nats < criteria.WORTHWHILE):  # no test is to decide
-        looked_at = [_held_by_most(report), *_worth_saying(report)]
+        looked_at = [_certain(report), *_worth_saying(report)]
     known = ([BY_SLUG[slug].check for slug in effects if slug in BY_SLUG] for effects in looked_at)
     checks = [Sentence(f"Next: {'. Also '.join(each)}.") for each in [next(filter(None, known), [])] if each]
     if best is None:
         no_more = "" if report.gain is None else "No further test would tell much more."
         return checks, [Sentence(no_more, SHOULD)]
     if best.narrows:
-        one = len(report.causes) == 1 or _held_by_most(report) == (best.effect,)
+        one = len(report.causes) == 1 or _certain(report) == (best.effect,)
         value = "value" if one else f"value of {effect_name(best.effect)}"
         better = f"{'For' if checks else 'Next, for'} a closer {value}: {_test(best)}"
         narrower = f"it narrows the interval by {100 * (1 - best.narrows):.0f} %"
@@ -403,11 +410,11 @@ def _next(report: Report) -> tuple[list[Sentence], list[Sentence]]:
     if best.nats < criteria.WORTHWHILE:
         return checks, [Sentence(f"Most helpful, though unlikely to decide: {_test(best)}.")]
     decides = f"It decides with probability {probability(best.probability)}"
-    held = _held_by_most(report) if report.verdict is Verdict.CAUSE_AMBIGUOUS else ()
+    held = _certain(report) if report.verdict is Verdict.CAUSE_AMBIGUOUS else ()
     doubtful = [slug for slug in (best.effect, best.other) if slug not in {*held, BASELINE}]
     if len(doubtful) == 1:
         decides += f" whether {_cause_name(doubtful[0])} is at work"
-    elif {(best.effect,), (best.other,)} != set(_worth_saying(report)):
+    elif doubtful and {(best.effect,), (best.other,)} != set(_worth_saying(report)):
         decides += f"; hardest to tell apart are {listed([_cause_name(slug) for slug in doubtful])}"
     return checks, [Sentence(f"{first}: {_test(best)}. {decides}.")]
 
@@ -417,7 +424,9 @@ def _test(advice: Advice) -> str:
     trial = TRIALS.get(advice.key)
     brief = "" if trial is None else trial.brief
     hours = advice.minutes / 60.0
-    lasts = f"{round(hours):,} hours" if hours >= 3.0 else f"{round(advice.minutes)} minutes" if hours > 0.0 else ""
+    lasts = (
+        f"{round(hours):,} hours" if hours >= 3.0 else f"{max(round(advice.minutes), 1)} minutes" if hours > 0.0 else ""
+    )
     aside = ", ".join(
         part for part in (f"{lasts} in all" if lasts else "", "steps in the plan" if brief else "") if part
     )

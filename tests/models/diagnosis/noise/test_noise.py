@@ -19,7 +19,7 @@ from models.diagnosis.design.design import Design, build_design
 from models.diagnosis.design.loop_bins import BINS, period_differences
 from models.diagnosis.explanations.verdict import Verdict
 from models.diagnosis.noise import estimate
-from models.diagnosis.noise.covariance import Noise, gains_of, whitened, without_gains
+from models.diagnosis.noise.covariance import Noise, whitening
 from models.diagnosis.noise.estimate import estimate_noise, first_noise
 from models.diagnosis.pooled_fit.baseline_fit import fit_baseline
 from models.records.runs import Record
@@ -116,7 +116,7 @@ def test_whitening_is_the_inverse_root_of_the_covariance(sigma: float, lost: int
     own = rng.standard_normal(int(design.curve.max()) + 1)  # noise alone, and a gain of each curve alone
     probe = np.zeros((design.torque.size, 2))
     probe[rows] = np.stack([rng.standard_normal(rows.size), torque * 0.002 * own[design.curve[rows]]], axis=1)
-    white = without_gains(whitened(probe, design, noise), gains_of(design, design.torque, noise), 0.004, 0.002)
+    white = whitening(design, design.torque, noise)(probe)
     expected = probe[rows].T @ np.linalg.solve(covariance, probe[rows])
     # the filter starts from a row's own past that is not known: a part in hundred
     scale = np.sqrt(np.diag(expected))
