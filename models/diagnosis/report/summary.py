@@ -92,7 +92,7 @@ def stated(estimate: Estimate, slug: str) -> str:
         value, low, high = -value, -high, -low
     size, ends = size_of(slug, value, estimate.unit), [size_of(slug, end, estimate.unit) for end in (low, high)]
     sign = None if estimate.one_sided else estimate.sign_probability
-    unsure = sign is not None and (low < 0.0 < high or sign <= 0.99)
+    unsure = sign is not None and (low < 0.0 < high or sign < 1.0 - criteria.SIGN_UNDETERMINED)
     interval = f"90 % interval {ends[0].partition(' ')[0]} to {ends[1]}" if high > low else ""
     aside = "; ".join(
         filter(None, (interval, f"this sign has probability {probability(sign or 0.0)}" if unsure else ""))

@@ -206,7 +206,7 @@ function advice({ advice: tests = [], clutch_id: clutch, diagnosis_id: name }) {
   });
   const choice = tests.length > 1 ? h("p", "One of these is enough; the best comes first.") : null;
   const plan = files(`${clutch}-plan`, `${clutchPath(clutch)}/diagnoses/${name}/plan.csv`);
-  return part("What to test next", choice, h("ol", items), quiet("As a protocol for the rig: ", plan));
+  return part("What to test next", choice, h("ol", items), quiet("The plan for the rig: ", plan));
 }
 
 /** @param {DiagnosisOut} diagnosis */
