@@ -112,9 +112,9 @@ TRIALS: dict[str, Trial] = {
     "light_sweep": Trial(text=_LIGHT_SWEEP, pressure=0.25),
     "light_sweeps": Trial(text=f"{_LIGHT_SWEEP}, five times", pressure=0.25, times=5),
     "repeats": Trial(text="the stationary test again at once, five times", times=5),
-    "more_states": Trial(text="three more stationary tests, each after the usual use", later=3),
+    "more_states": Trial(text="three more stationary tests, each after the usual cycles", later=3),
     "rests": Trial(
-        text="three more stationary tests, each after the usual use; rest two days before the first and third",
+        text="three more stationary tests, each after the usual cycles; rest two days before the first and third",
         later=3,
         rest=48 * 3600.0,
     ),

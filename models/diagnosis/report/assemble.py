@@ -51,7 +51,8 @@ def candidates_of(
                 low, high = (_finite(scale * end) for end in size.interval)
                 estimate = _estimate(slug, size.value, size.sd)
                 estimate = replace(estimate, stated_interval=(low, high), stated_sign=1.0 - size.other_sign)
-            estimate = replace(estimate, name=_with_onset(estimate.name, effect))
+            if onset := _onset(effect):
+                estimate = replace(estimate, name=f"{estimate.name} ({onset})")
         elif slug in records:
             estimate, evidence = records[slug].estimate, records[slug].log_evidence
             estimate = replace(estimate, value=_finite(estimate.value), sd=_finite(estimate.sd))
@@ -71,10 +72,10 @@ def candidates_of(
     return tuple(candidates)
 
 
-def _with_onset(name: str, fitted: FittedEffect) -> str:
-    """A name with the cycles from which on the effect is at work."""
+def _onset(fitted: FittedEffect) -> str:
+    """From which cycles on an effect is at work, in words; nothing where it is from the start."""
     onset = fitted.effect.onset(fitted.shape)
-    return name if onset == FROM_THE_START else f"{name} (from about {number(onset)} cycles on)"
+    return "" if onset == FROM_THE_START else f"from about {number(onset)} cycles on"
 
 
 def _estimate(slug: str, amplitude: float, deviation: float) -> Estimate:
@@ -107,14 +108,15 @@ def reason_against(gain: Gain | None, sizes: Sizes) -> str:
     if not sizes.draws:
         return ""
     if gain is not None and (gain.rmse_after > criteria.MOST_WORSE * gain.rmse_before or gain.log_score_gain < 0):
-        return "Not to be adopted, even if confirmed: other runs are predicted no better with it in the model."
+        it = "it" if len(sizes.by_slug) == 1 else "them"
+        return f"Do not adopt {it}, even if confirmed: with {it}, the model predicts other runs no better than without."
     sentences = []
     for slug, size in sizes.by_slug.items():
         if size.other_sign > criteria.SIGN_UNDETERMINED:
             effect = BY_SLUG[slug]
             low, high = (size_of(slug, effect.scale * end, effect.unit) for end in size.interval)
             sentences.append(
-                f"Not to be adopted: not even the sign of {effect_name(slug)} is sure (wrong with probability "
+                f"Do not adopt it: not even the sign of {effect_name(slug)} is sure (wrong with probability "
                 f"{size.other_sign:.2f}; 90 % interval {low.partition(' ')[0]} to {high})."
             )
     return " ".join(sentences)
@@ -182,7 +184,7 @@ def report_of(
         statistics=statistics_of(posterior, judgement, scatter),
         tests=len(problem.design.runs),
         states=int(problem.design.facts.states.size),
-        resembles="" if judgement.likest is None else _with_onset(judgement.likest.effect.title, judgement.likest),
+        resembles=", ".join(filter(None, (like.effect.title, _onset(like)))) if (like := judgement.likest) else "",
         scatter=scatter,
     )
     return replace(report, summary=summarise(report))

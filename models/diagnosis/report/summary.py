@@ -275,7 +275,7 @@ def _ambiguous(report: Report) -> list[Sentence]:
         unsaid = [effect_name(slug) for slug in report.causes if slug not in said] if brief else []
         left = [item for item in report.explanations if item.effects and set(held) <= set(item.effects)]
         rest = sum(item.probability for item in left if item not in choices[:count])
-        others = [f"{'with ' * bool(held)}others ({probability(rest)})"] if rest >= 0.005 and not unsaid else []
+        others = [f"others ({probability(rest)})"] if rest >= 0.005 and not unsaid else []
         sentences = [_open(report, held, [*alternatives, *unsaid, *others]), *remaining]
         if _words([sentence for sentence in sentences if sentence.matters == MUST]) <= criteria.MAX_WORDS:
             break
@@ -289,19 +289,16 @@ def _certain(report: Report) -> tuple[str, ...]:
 
 
 def _alternative(report: Report, effects: Sequence[str], held: Sequence[str], *, brief: bool) -> str:
-    """An explanation, beside the causes that are held to be at work: its causes, with its probability and their sizes."""
+    """An explanation, beside the causes that are certain: its causes, with its probability and their sizes."""
     estimates = {candidate.effect: candidate.estimate for candidate in report.candidates}
     beside = [slug for slug in effects if slug not in held]
-    known = [slug for slug in beside if slug in BY_SLUG and slug in estimates]
-    like = f", such as {report.resembles}" if report.resembles and UNCATALOGUED in beside and not brief else ""
-    names = [effect_name(slug) if brief else _cause_name(slug) for slug in beside if slug != UNCATALOGUED]
-    names += [_cause_name(UNCATALOGUED)] if UNCATALOGUED in beside else []
-    joined = " together with ".join(names)
-    if held:
-        joined = f"with {joined}" if names else "alone"
+    names = [effect_name(slug) if brief and slug in BY_SLUG else _cause_name(slug) for slug in beside]
     share = next(item.probability for item in report.explanations if item.effects == tuple(effects))
-    sizes = [] if brief else list(filter(None, (_brief_size(estimates[slug], slug) for slug in known)))
-    return f"{joined} ({'; '.join((probability(share), *sizes))}){like}"
+    more = [] if brief else [_brief_size(estimates[slug], slug) for slug in beside if slug in estimates]
+    if report.resembles and UNCATALOGUED in beside and not brief:
+        more.append(f"such as {report.resembles}")
+    aside = "; ".join((probability(share), *filter(None, more)))
+    return f"{' together with '.join(names) or _ALONE} ({aside})"
 
 
 def _brief_size(estimate: Estimate, slug: str) -> str:
@@ -323,6 +320,9 @@ def _worth_saying(report: Report) -> list[tuple[str, ...]]:
     return [effects for effects in near if shares[effects] > (1.0 - criteria.SURE) * shares[near[0]]]
 
 
+_ALONE = "alone"
+
+
 def _open(report: Report, sure: Sequence[str], alternatives: Sequence[str]) -> Sentence:
     """What is certain, and the alternatives in words."""
     if not sure:
@@ -333,9 +333,14 @@ def _open(report: Report, sure: Sequence[str], alternatives: Sequence[str]) -> S
         first = "Explanations that remain, with their probabilities"
         return Sentence(f"The data {disagree}. {first}: {listed(alternatives, 'or')}.")
     share = sum(item.probability for item in report.explanations if set(sure) <= set(item.effects))
-    verb = "is at work" if len(sure) == 1 else "are at work"
-    names_in_words = f"{listed([_with_article(slug) for slug in sure])} {verb} (probability {probability(share)})"
-    return Sentence(f"{_capitalised(names_in_words)}: {listed(alternatives, 'or')}.")
+    verb, it = ("is at work", "it") if len(sure) == 1 else ("are at work", "them")
+    first = f"{listed([_with_article(slug) for slug in sure])} {verb} (probability {probability(share)})"
+    alone = next((text for text in alternatives if text.startswith(_ALONE)), "")
+    beside = [text for text in alternatives if text != alone]
+    first += f", maybe {alone}." if alone else "."
+    return Sentence(
+        f"{_capitalised(first)} Beside {it} may be {listed(beside, 'or')}." if beside else _capitalised(first)
+    )
 
 
 def _cause_name(slug: str) -> str:
@@ -403,7 +408,8 @@ def _next(report: Report) -> tuple[list[Sentence], list[Sentence]]:
     if best.narrows:
         one = len(report.causes) == 1 or _certain(report) == (best.effect,)
         value = "value" if one else f"value of {effect_name(best.effect)}"
-        better = f"{'For' if checks else 'Next, for'} a closer {value}: {_test(best)}"
+        change = ", which may change this" if report.not_adoptable else ""
+        better = f"{'For' if checks else 'Next, for'} a closer {value}{change}: {_test(best)}"
         narrower = f"it narrows the interval by {100 * (1 - best.narrows):.0f} %"
         return checks, [Sentence(f"{better}; {narrower}.", RATHER if checks else MUST)]
     first = "Then" if checks else "Next"

@@ -252,7 +252,7 @@ def found(causes: list[str], advice: list[str] | None = None, *, adoptable: bool
         (
             summary(9000.0),
             found(["rest_recovery"]) | {"advice": {"test": TRIALS["rests"].text, "separates": ["rest_recovery"]}},
-            "Out of specification: ", "Run three more stationary tests, each after the usual use; rest two days before "
+            "Out of specification: ", "Run three more stationary tests, each after the usual cycles; rest two days before "
             "the first and third: it shows whether rest recovery is at work.",
         ),
         (summary(9000.0), found([]), "Out of specification: ", "Read the diagnosis before you rely on the forecast."),

@@ -53,8 +53,8 @@ def reported(
     [
         (GAIN, ""),
         (None, ""),
-        (WORSE, "other runs are predicted no better"),
-        (LARGER, "other runs are predicted no better"),
+        (WORSE, "predicts other runs no better"),
+        (LARGER, "predicts other runs no better"),
     ],
 )
 def test_an_extension_that_predicts_worse_is_withheld_and_the_verdict_stays(given, posterior, gain, why):

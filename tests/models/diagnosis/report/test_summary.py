@@ -94,7 +94,7 @@ def findings(verdict: Verdict, *causes: str) -> Report:
     )
 
 
-WHY = "Not to be adopted, even if confirmed: other runs are predicted no better with it in the model."
+WHY = "Do not adopt it, even if confirmed: with it, the model predicts other runs no better than without."
 #: Steps of an advised test, and the words of a long one.
 SWEEP = Step(
     kind="stationary_stribeck", pressures=(1e5, 4e5), speeds=(2.0944, 206.3), temperature=None, cycles=1, minutes=3
@@ -249,11 +249,13 @@ def test_a_cause_of_all_explanations_is_certain_and_open_is_what_is_beside_it() 
     found = findings(Verdict.CAUSE_AMBIGUOUS, "channel_delay")
     both = explanations_of({("channel_delay",): 0.55, ("channel_delay", UNCATALOGUED): 0.45})
     said = summarise(replace(found, explanations=both))
-    assert "A channel delay is at work (probability above 0.99): alone (0.55) or with an unknown cause (0.45)." in said
+    assert "A channel delay is at work (probability above 0.99), maybe alone (0.55). Beside it may be an" in said
     assert "Explanations that remain" not in said
     one = explanations_of({("channel_delay", UNCATALOGUED): 1.0})
     said = summarise(replace(found, explanations=one))
-    assert "A channel delay is at work (probability above 0.99): with an unknown cause (above 0.99)." in said
+    assert (
+        "A channel delay is at work (probability above 0.99). Beside it may be an unknown cause (above 0.99)." in said
+    )
     alike = {("pressure_offset", "torque_zero_shift"): 0.6, ("torque_zero_shift",): 0.25, ("oil_change",): 0.15}
     found = findings(Verdict.CAUSE_AMBIGUOUS, "pressure_offset", "torque_zero_shift", "oil_change")
     said = summarise(replace(found, explanations=explanations_of(alike)))
@@ -297,8 +299,8 @@ def test_what_a_test_decides_and_how_surely() -> None:
     shares = {("oil_change",): 0.6, ("oil_change", "running_in"): 0.3, ("oil_change", UNCATALOGUED): 0.1}
     held = replace(found, explanations=explanations_of(shares))
     said = summarise(held)
-    assert "An oil change is at work (probability above 0.99): alone (0.60)," in said
-    assert "or with others (0.10)." in said
+    assert "An oil change is at work (probability above 0.99), maybe alone (0.60). Beside it" in said
+    assert "or others (0.10)." in said
     assert "It decides with probability 0.80 whether unfinished running in is at work." in said
     assert "Viscous friction stepped up by 0.363 % (" in said
     assert said.endswith("Adopt nothing before the next diagnosis.")
