@@ -97,14 +97,14 @@ export function inspections(place, { id, path, name }, change) {
   async function poll(/** @type {Receipt[]} */ events) {
     /** @type {{ items: InspectionOut[], changed: boolean }} */
     const { items, changed } = await readAll(`${base}?limit=1000`);
-    const anew = changed || accepted === null;
-    if (anew) {
+    const different = changed || accepted === null;
+    if (different) {
       items.sort((a, b) => a.cycles - b.cycles || a.lining.localeCompare(b.lining));
       list.replaceChildren(...(items.length > 0 ? listed(items) : [h("p", "No inspection yet.")]));
       accepted = items.filter(({ state }) => state === "accepted");
       photographs.show(accepted);
     }
-    if (accepted !== null && (anew || events !== marks)) draw(accepted, events);
+    if (accepted !== null && (different || events !== marks)) draw(accepted, events);
     marks = events;
   }
 
