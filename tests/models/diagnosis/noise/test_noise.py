@@ -7,6 +7,7 @@ import pytest
 from scipy.signal import lfilter
 
 from models.arrays import FloatArray
+from models.diagnosis import criteria
 from models.diagnosis.campaign import Campaign, DynamicRun
 from models.diagnosis.design.autocorrelation import (
     Correlation,
@@ -19,7 +20,7 @@ from models.diagnosis.design.design import Design, build_design
 from models.diagnosis.design.loop_bins import BINS, period_differences
 from models.diagnosis.explanations.verdict import Verdict
 from models.diagnosis.noise import estimate
-from models.diagnosis.noise.covariance import Noise, whitening
+from models.diagnosis.noise.covariance import Noise, gains_of, whitening
 from models.diagnosis.noise.estimate import estimate_noise, first_noise
 from models.diagnosis.pooled_fit.baseline_fit import fit_baseline
 from models.records.runs import Record
@@ -121,6 +122,24 @@ def test_whitening_is_the_inverse_root_of_the_covariance(sigma: float, lost: int
     # the filter starts from a row's own past that is not known: a part in hundred
     scale = np.sqrt(np.diag(expected))
     np.testing.assert_allclose(white.T @ white / np.outer(scale, scale), expected / np.outer(scale, scale), atol=0.02)
+
+
+def test_beyond_so_many_pressures_neighbours_share_a_gain(design: Design, monkeypatch: pytest.MonkeyPatch) -> None:
+    noise = Noise(
+        deviation=np.ones(design.torque.size),
+        plateaus=Correlation(share=0.7, decay=0.6),
+        loops=Correlation(),
+        run_gain=0.0,
+        curve_gain=0.0,
+    )
+    own = gains_of(design, design.torque, noise)
+    monkeypatch.setattr(criteria, "MOST_GAINS", 2)
+    shared = gains_of(design, design.torque, noise)
+    assert own.overlaps.shape[1] > shared.overlaps.shape[1] == 2
+    np.testing.assert_allclose(shared.overlaps.sum(axis=(1, 2)), own.overlaps.sum(axis=(1, 2)))
+    first = design.rows.run == 0
+    lower, upper = (design.level[first & (shared.curve == place)] for place in (0, 1))
+    assert lower.max() < upper.min()
 
 
 def scattered(given: Campaign, scatter: float) -> Campaign:
