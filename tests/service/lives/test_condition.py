@@ -84,6 +84,17 @@ def test_two_tests_say_at_least_how_many_cycles_are_left(bench: Bench) -> None:
     assert item(bench)["summary"]["statement"] == life["statement"]
 
 
+@pytest.mark.parametrize(
+    ("at_least", "words"),
+    [(None, "no further cycle is safe"), (0.99, "no further cycle is safe"), (1.9, "safe for 1 more cycle (95 %)"),
+     (9.9, "safe for 9 more cycles (95 %)"), (99.9, "safe for 99 more cycles (95 %)"),
+     (100.0, "safe for 100 more cycles (95 %)"), (1099.0, "safe for 1,000 more cycles (95 %)"),
+     (12_999.0, "safe for 12,000 more cycles (95 %)")],
+)  # fmt: skip
+def test_a_safe_bound_is_never_said_to_be_more_than_it_is(at_least: float | None, words: str) -> None:
+    assert bound_in_words(at_least) == words
+
+
 def test_a_life_of_millions_of_cycles_is_predicted_beyond_a_million(bench: Bench) -> None:
     for cycles in np.arange(7) * 1e6:
         bench.send(body("test", f"n{cycles:g}", float(cycles), wear=cycles / 2e7))

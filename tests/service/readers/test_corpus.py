@@ -348,6 +348,7 @@ REFUSED: list[tuple[Any, ...]] = [
     ("t;M\ns;Nm\nFaktor;1;0,1\n0;210\n1;211\n", "are the values already multiplied?"),
     ("t;M\ns;Nm*10\n0;2.1\n", "'Nm*10'"),
     ("t [s];Torque A1 [Nm];Torque A2 [Nm]\n0;1;2\n", "torque_nm must be one column"),
+    ("t [s];M [Nm]\n0;21\n", "must not name one column for torque_nm and pressure_bar", "torque_nm:M,pressure_bar:M"),
     (
         "t [s];p [bar];n inner [rpm];n outer [rpm];M [Nm]\n0;5;520;500;20\n",
         "if the columns hold the speeds of both sides, send the difference",

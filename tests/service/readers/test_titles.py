@@ -81,7 +81,8 @@ def test_units_are_converted(channel: str, shown: dict[str, float], expected: fl
 @pytest.mark.parametrize(
     ("channel", "unit", "factor"),
     [("time_s", "10 ms", 0.01), ("time_s", "100ns", 1e-7), ("torque_nm", "0.1 Nm", 0.1), ("speed_rpm", "x1000 rpm", 1e3),
-     ("torque_nm", "10^-3 kNm", 1.0), ("time_s", "milliseconds since 2026-11-02 08:00:00", 1e-3),
+     ("torque_nm", "10^-3 kNm", 1.0), ("torque_nm", "1/10 Nm", 0.1), ("pressure_bar", "10 bar", None),
+     ("time_s", "milliseconds since 2026-11-02 08:00:00", 1e-3),
      *((channel, unit, None) for channel, unit in (
          ("pressure_bar", "mPa"), ("pressure_bar", "Nm"), ("torque_nm", "MNm"), ("speed_rpm", "s"), ("speed_rpm", "kHz"),
          ("oil_temperature_c", "Pa"), ("time_s", ""), ("torque_nm", "V")))],

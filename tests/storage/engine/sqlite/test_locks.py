@@ -70,8 +70,8 @@ def test_who_does_not_get_it_in_time_is_told_and_a_kill_frees_it(tmp_path: Path)
         pytest.fail("two writers at once")
     os.kill(other.pid, signal.SIGKILL)
     other.join(IN_TIME)
-    with impatient.held():
-        pass
+    with impatient.held(), ThreadPoolExecutor(1) as pool, pytest.raises(DatabaseBusy, match="another request"):
+        pool.submit(impatient.held().__enter__).result(IN_TIME)
 
 
 def test_where_no_lock_can_be_made_nothing_is_written_and_no_service_starts(tmp_path: Path) -> None:
