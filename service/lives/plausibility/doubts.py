@@ -83,13 +83,17 @@ def _unit_notice(verdict: Verdict, shown: Shown) -> Notice:
         oil = (shown.oil or 0.0) - ZERO_CELSIUS
         message = f"oil temperature is {oil:.4g} °C: was it sent in {slip.unit}?"
     else:
-        gives = {
-            "pressure": f"pressure is up to {(shown.pressure or 0.0) / PASCALS_PER_BAR:.4g} bar and gives",
-            "torque": "torque gives",
-            "speed": f"speed is up to {(shown.speed or 0.0) / RADIANS_PER_SECOND_PER_RPM:.4g} rpm and gives",
+        of = {
+            "pressure": f"pressure is up to {(shown.pressure or 0.0) / PASCALS_PER_BAR:.4g} bar",
+            "torque": "torque",
+            "speed": f"speed is up to {(shown.speed or 0.0) / RADIANS_PER_SECOND_PER_RPM:.4g} rpm",
         }[slip.name]
-        cof = f" a COF of {shown.cof:.3g}" if shown.cof is not None else ""
-        message = f"{gives}{cof}, {_expected(verdict)}: was it sent in {slip.unit}?"
+        low, high = verdict.expected or (math.inf, -math.inf)
+        if shown.cof is None or low <= shown.cof <= high:
+            odd = ", unlike in other tests"
+        else:
+            odd = f"{'' if slip.name == 'torque' else ' and'} gives a COF of {shown.cof:.3g}{_expected(verdict)}"
+        message = f"{of}{odd}: was it sent in {slip.unit}?"
     return Notice(code=UNIT, message=f"{message} Withdraw the run and send it in the channel's unit, or confirm it.")
 
 
@@ -104,15 +108,15 @@ def _expected_then(verdict: Verdict) -> bool:
 def _expected(verdict: Verdict) -> str:
     if verdict.expected is None:
         return ""
-    return f"where {verdict.expected[0]:.3g} to {verdict.expected[1]:.3g} is expected"
+    return f", where {verdict.expected[0]:.3g} to {verdict.expected[1]:.3g} is expected"
 
 
 def _cof_notice(verdict: Verdict, sent: Reading) -> Notice:
     cof = math.exp(sent.log_cof or -20.0)
     beyond = abs(math.log(cof / criteria.COF)) / criteria.LOG_COF_SD > 2.5
     cause = "Is a sensor or a unit wrong?" if beyond else "Is it another clutch's test?"
-    expected = f"{_expected(verdict)} at {_number(sent.cycles)} cycles"
-    message = f"mean COF is {cof:.3g}, {expected}. {cause} Withdraw the run, or confirm it."
+    at = f"{_expected(verdict)} at {_number(sent.cycles)} cycles"
+    message = f"mean COF is {cof:.3g}{at}. {cause} Withdraw the run, or confirm it."
     return Notice(code=BEYOND_PHYSICS if beyond else OFF_COURSE, message=message)
 
 

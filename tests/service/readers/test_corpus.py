@@ -458,6 +458,9 @@ GIVEN: dict[str, tuple[str, dict[str, Any], dict[str, Any], list[str]]] = {
         + each(lambda t, _, n, m: f"{t};{m};{n};{HALF[round(100 * t)]}"),
         {}, {"pressure_bar": [*RECORD["pressure_bar"][:-1], 5.001]}, ["brought_to_one_clock"],
     ),
+    "clocks put back between rows, each with its offset": (
+        "time;M [Nm]\n2026-11-01T01:59:59-04:00;21\n2026-11-01T01:00:01-05:00;22\n", {}, {"time_s": [0.0, 2.0]}, [],
+    ),
     "a time of two that is chosen": (TWO_CLOCKS, {"time": "Time [s]"}, RECORD, ["long_table"]),
     "a time that is not wanted": (
         "Zeit [s],p [bar],n [rpm],M [Nm]\n" + rows(), {"time": "none"}, {name: RECORD[name] for name in PLATEAUS}, [],

@@ -29,6 +29,13 @@ def next_test(*, torque: float = 1.0, oil: float = 85.0, **changed: Any) -> Body
     return body | changed
 
 
+def scaled(channel: str, factor: float) -> Body:
+    """The test that follows, a channel of it in another unit."""
+    body = next_test()
+    body["channels"][channel] = [factor * value for value in body["channels"][channel]]
+    return body
+
+
 def made(at: float, level: float, *, new_level: bool = False) -> Event:
     """A test of a clutch whose COF hardly changes, at a level of it."""
     cof = level * (1.0 + 0.002 * np.random.default_rng(int(at)).standard_normal())
@@ -89,6 +96,19 @@ BLOCK: Body = {"kind": "duty_cycles", "run_id": "d", "duty": {"cycles": 1000, "i
         pytest.param(
             CYCLES, next_test(oil=358.1, torque=1.1), ("unit",), ["was it sent in K?"],
             id="oil in kelvin whatever COF is",
+        ),
+        pytest.param(
+            CYCLES, scaled("pressure_bar", 14.5038), ("unit",), ["bar and gives a COF of", "was it sent in psi?"],
+            id="pressure in psi",
+        ),
+        pytest.param(
+            CYCLES, scaled("speed_rpm", 0.10472), ("unit",),
+            ["speed is up to 206.3 rpm, unlike in other tests: was it sent in rad/s?"],
+            id="speed in radians a second",
+        ),
+        pytest.param(
+            (), scaled("pressure_bar", 14.5), ("unit",), ["bar and gives a COF of 0.00244: was it sent in psi?"],
+            id="pressure in psi of a first test",
         ),
         pytest.param((5500,), BLOCK | {"cycles": 10_000}, (), [], id="any of equal blocks first"),
         pytest.param(CYCLES, BLOCK | {"cycles": 70_000}, OFF_PACE, [], id="a zero too many in a block"),
