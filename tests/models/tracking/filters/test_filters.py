@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from filterpy.common import Q_continuous_white_noise
 from filterpy.kalman import MerweScaledSigmaPoints, UnscentedKalmanFilter
 from scipy.integrate import trapezoid
 
@@ -304,6 +305,8 @@ def test_a_step_of_all_filters_at_once_is_filterpys_step_of_each() -> None:
     mean, covariance = ukf.predicted(normals, history)
     noise = covariance - ukf.predicted(replace(normals, form=np.zeros(2, dtype=np.intp)), history)[1]
     assert noise[0].max() == 0.0 < noise[1].max()
+    white = Q_continuous_white_noise(2, dt=0.2 * last / reference)
+    np.testing.assert_allclose(noise[1, 4:, 4:] / noise[1, 5, 5], white / white[1, 1], rtol=1e-9)
     expected, variance, across = ukf.measured(normals, mean, covariance, after)
     for one in range(2):
         points = MerweScaledSigmaPoints(n=6, alpha=1.0, beta=0.0, kappa=0.0)
