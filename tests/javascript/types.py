@@ -1,7 +1,7 @@
 """The types of the API's answers for the checks of the dashboard's JavaScript, from the OpenAPI document.
 
-`python -m tests.javascript.types` writes `generated/shared/types.d.ts` beside this file, an interface a schema;
-`tsconfig.json` lays that folder over the pages' own, so that modules import `../shared/types.js`. Browsers never load it.
+`python -m tests.javascript.types` writes `generated/types.d.ts` beside this file, an interface a schema, which every module
+knows without an import. Browsers never load it.
 """
 
 import json
@@ -11,22 +11,25 @@ from typing import Any
 from service.app import create_app
 from service.settings import Settings
 
-FILE = Path(__file__).parent / "generated" / "shared" / "types.d.ts"
+FILE = Path(__file__).parent / "generated" / "types.d.ts"
 #: What no single schema is.
 GENERAL = """\
-export type Quantiles = Record<string, number | null>;
-export type Table = (number | null)[][];
+type Quantiles = Record<string, number | null>;
+type Table = (number | null)[][];
 /** A list's page; `next` is the cursor of the page after it. */
-export interface ListPage<Item> { items: Item[]; next: string | null }
-export type Channels = Record<string, number[]>;
+interface ListPage<Item> { items: Item[]; next: string | null }
+type Channels = Record<string, number[]>;
 """
+#: A schema whose name TypeScript has for something else.
+TAKEN = {"Parameters": "StribeckParameters"}
 SIMPLE = {"string": "string", "number": "number", "integer": "number", "boolean": "boolean", "null": "null"}
 
 
 def type_of(schema: dict[str, Any]) -> str:
     """A schema as a type of TypeScript."""
     if "$ref" in schema:
-        return str(schema["$ref"]).rpartition("/")[2]
+        name = str(schema["$ref"]).rpartition("/")[2]
+        return TAKEN.get(name, name)
     if "const" in schema:
         return json.dumps(schema["const"])
     if "enum" in schema:
@@ -46,15 +49,15 @@ def type_of(schema: dict[str, Any]) -> str:
 def interface(name: str, schema: dict[str, Any]) -> str:
     """An interface, or an alias where the schema is no object with properties. An answer has all its fields."""
     if "properties" not in schema:
-        return f"export type {name} = {type_of(schema)};\n"
+        return f"type {name} = {type_of(schema)};\n"
     fields = (f"  {json.dumps(field)}: {type_of(kind)};\n" for field, kind in schema["properties"].items())
-    return f"export interface {name} {{\n{''.join(fields)}}}\n"
+    return f"interface {name} {{\n{''.join(fields)}}}\n"
 
 
 def text(document: dict[str, Any]) -> str:
     """All types of an OpenAPI document."""
     schemas = document["components"]["schemas"]
-    return GENERAL + "".join(interface(name, schema) for name, schema in sorted(schemas.items()))
+    return GENERAL + "".join(interface(TAKEN.get(name, name), schema) for name, schema in sorted(schemas.items()))
 
 
 if __name__ == "__main__":

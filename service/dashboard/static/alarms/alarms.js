@@ -1,4 +1,3 @@
-// @ts-check
 // Alarms: events that wait for someone to acknowledge them, the rules that raise them, and the receivers that are called. Answers of
 // the API go in; lists, a form and tests come out, of all clutches or of one. Open this file first, then form.js (a rule as a sentence
 // and in a dialog).
@@ -9,8 +8,6 @@ import { rowFiles } from "../shared/files.js";
 import { moment } from "../shared/format.js";
 import { problemView } from "../shared/problem_view.js";
 import { askReceiver, askRule, ruleText } from "./form.js";
-
-/** @import { AlarmOut, EventOut, TestedOut, WebhookOut } from "../shared/types.js" */
 
 /** Events that are shown; the list of the API holds all. */
 const SHOWN = 50;

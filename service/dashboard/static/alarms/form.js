@@ -1,4 +1,3 @@
-// @ts-check
 // What a rule of an alarm watches, a rule as part of a sentence, and the questions of the alarms' page: a rule, a receiver. Each
 // resolves to what is to be sent, null where it is left.
 
@@ -6,8 +5,6 @@ import { Problem } from "../shared/api.js";
 import { asked } from "../shared/dialog.js";
 import { field, h } from "../shared/dom.js";
 import { fixed, NOT_A_NUMBER, numberOf, percent, significant, words } from "../shared/format.js";
-
-/** @import { AlarmOut } from "../shared/types.js" */
 
 /** @typedef {AlarmOut["quantity"]} Watched */
 

@@ -1,4 +1,3 @@
-// @ts-check
 // The charts: answers of the API go in, figures with a title, a table, a PNG and a CSV come out. Open this file first (one
 // chart; until someone points at it, and where the plotting library does not load, its drawing is a light one), then life.js:
 // like fan.js, loops.js, parameters.js and stribeck.js it says what its charts show; the others say how a chart is drawn.
@@ -10,8 +9,6 @@ import { base, config } from "./layout.js";
 import { colours } from "./palette.js";
 import { has3d, painted, plotly, want, wanted } from "./plotting.js";
 import { sketch } from "./sketch.js";
-
-/** @import { Cell, Column, Scheme, SettledFigure, Size, Spec, WholeFigure } from "./types.js" */
 
 /**
  * @typedef {object} Options

@@ -1,11 +1,7 @@
-// @ts-check
 // The columns that the charts' tables share, and the rows of a quantity that is measured and follows eq. 6.
 
 import { fixed, significant } from "../shared/format.js";
 import { named, units } from "../shared/units.js";
-
-/** @import { Measured, Trajectory } from "../shared/types.js" */
-/** @import { Cell, Column } from "./types.js" */
 
 /** Half of a 90 % interval in standard deviations. */
 export const HALF_OF_90 = 1.645;

@@ -1,4 +1,3 @@
-// @ts-check
 // Mean COF, its law with the 90 % band, the threshold and when it is reached; behind it the earlier predictions.
 
 import { cycles, estimate, fixed, interval, probability } from "../shared/format.js";
@@ -6,9 +5,6 @@ import { column, CYCLES, KIND, measuredAndLaw } from "./columns.js";
 import { eventMarks, vertical } from "./layout.js";
 import { faint } from "./palette.js";
 import { band, lineOf, measuredPoints, titled } from "./traces.js";
-
-/** @import { DegradationItem, Receipt, RemainingLife, SeriesItem, Trajectory } from "../shared/types.js" */
-/** @import { Annotation, Cell, Colours, PlainTrace, Shape, Spec } from "./types.js" */
 
 /** @typedef {{ at: number, cof: number | null, remaining: SeriesItem }} Prediction made at `at` cycles, when mean COF was `cof` */
 

@@ -1,10 +1,7 @@
-// @ts-check
 // Where a chart of lines, points and bands has its axes, ticks and legend: computed before anything is drawn, so that the
 // light drawing and the plotting library's, which takes its place, coincide.
 
 import { fixed } from "../shared/format.js";
-
-/** @import { Axis, LegendEntry, PlainTrace, Range, SettledFigure, Size, Tick, Trace, WholeFigure } from "./types.js" */
 
 /** @typedef {{ size: number, family: string }} TextFont */
 
@@ -18,7 +15,7 @@ export function widthOf(text, { size, family }) {
 
 /**
  * The steps that the plotting library would choose: 1, 2 or 5 times a power of ten, at least about `least` px apart.
- * @param {Range} range
+ * @param {Span} range
  * @param {number} length px
  * @param {number} least px
  * @returns {Tick[]}
@@ -44,7 +41,7 @@ const isPlain = (trace) => (trace.type ?? "scatter") === "scatter" && !trace.xax
  * @param {Axis} axis
  * @param {(number | null)[][]} columns
  * @param {number} room share of the range
- * @returns {Range}
+ * @returns {Span}
  */
 function rangeOf({ range, rangemode }, columns, room) {
   if (range) return range;
@@ -139,7 +136,7 @@ export function settled({ data, layout }, { width, height }) {
 
 /**
  * How far the last value of the abscissa reaches past the axes, px; `inside`: width of the axes, px.
- * @type {(last: { at: number, text: string } | undefined, range: Range, inside: number, font: TextFont) => number}
+ * @type {(last: { at: number, text: string } | undefined, range: Span, inside: number, font: TextFont) => number}
  */
 function overhang(last, [from, to], inside, font) {
   return last ? Math.ceil(0.5 * widthOf(last.text, font) - (inside * (to - last.at)) / (to - from)) + 3 : 0;

@@ -1,8 +1,4 @@
-// @ts-check
 // How every chart looks: axes, margins, type, what the plotting library may do.
-
-/** @import { Receipt } from "../shared/types.js" */
-/** @import { Annotation, Axis, Colours, Layout, Line, Shape, WholeLayout } from "./types.js" */
 
 const FONT = 'system-ui, -apple-system, "Segoe UI", Roboto, "Noto Sans", sans-serif';
 const COARSE = matchMedia("(pointer: coarse)");

@@ -1,13 +1,10 @@
-// @ts-check
 // Remaining cycles as they were predicted at each test, and mean COF at every pressure.
 
 import { fixed } from "../shared/format.js";
 import { column, CYCLES, distinct, PRESSURE } from "./columns.js";
 import { band, linesByPressure, planar, titled } from "./traces.js";
 
-/** @import { Receipt, RemainingLife, StribeckItem } from "../shared/types.js" */
 /** @import { Prediction } from "./fan.js" */
-/** @import { Colours, PlainTrace, Spec } from "./types.js" */
 
 /**
  * Remaining cycles as they were predicted at each test, against what is predicted now.

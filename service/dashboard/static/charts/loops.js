@@ -1,4 +1,3 @@
-// @ts-check
 // Friction loops before the stationary curve of the same state (fig. 12): by state at one pressure (fig. 15), by pressure at
 // one state (fig. 13).
 
@@ -9,10 +8,8 @@ import { pressureRampOf, rampOf } from "./palette.js";
 import { curveOf, inUnit, measuredOf, xyOf } from "./stribeck_law.js";
 import { lineOf, planar } from "./traces.js";
 
-/** @import { ClutchOut, LoopItem, StribeckItem } from "../shared/types.js" */
 /** @import { Answers } from "./stribeck.js" */
 /** @import { CurvePoint } from "./stribeck_law.js" */
-/** @import { PlainTrace, Spec } from "./types.js" */
 
 /** Most points of a loop that are drawn, and bar about a level that still belong to it: between two levels torque is of neither. */
 const LOOP = { most: 1500, gap: 0.1 };

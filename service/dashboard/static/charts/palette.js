@@ -1,7 +1,4 @@
-// @ts-check
 // The charts' colours, taken from the style sheet, so that light and dark are defined in one place.
-
-/** @import { Colours, Scheme } from "./types.js" */
 
 export const NAMES = /** @type {const} */ ([
   "ink",

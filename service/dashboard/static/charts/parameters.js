@@ -1,13 +1,9 @@
-// @ts-check
 // The four Stribeck parameters over cycles: eq. 6 with its band at one pressure (fig. 10), and over all of them (fig. 11).
 
 import { estimate } from "../shared/format.js";
 import { CYCLES, intervalColumns, KIND, measuredAndLaw, PRESSURE } from "./columns.js";
 import { scaleOf } from "./palette.js";
 import { measuredPoints, planar, solid, spatialPoints, surfaceOf, titled, tracked } from "./traces.js";
-
-/** @import { DegradationItem, Receipt, Trajectory } from "../shared/types.js" */
-/** @import { Range, Spec } from "./types.js" */
 
 /** @typedef {"static_torque_nm" | "coulomb_ratio" | "stribeck_velocity_m_s" | "viscous_coefficient"} ParameterName */
 
@@ -34,7 +30,7 @@ const rowsOf = (item) => measuredAndLaw(item, { measured: "identified", law: "la
 
 /**
  * A range that the measurements set, not an error bar that leaves the paper.
- * @type {(item: DegradationItem) => Range}
+ * @type {(item: DegradationItem) => Span}
  */
 function rangeOf({ measured, trajectory }) {
   const all = [...measured.value, ...trajectory.median].sort((a, b) => a - b);

@@ -1,8 +1,5 @@
-// @ts-check
 // The plotting library, loaded once, where a chart cannot be drawn without it or someone points at one that can: it is as
 // large as all else that a page loads, ten times over, and running it keeps the page busy for a second.
-
-/** @import { Plotting } from "./types.js" */
 
 /** @type {Promise<Plotting> | null} */
 let loading = null;

@@ -1,14 +1,11 @@
-// @ts-check
 // A chart drawn light: plain SVG, at once, of what the plotting library draws in its place as soon as it has loaded.
 
 import { svg } from "../shared/dom.js";
 
-/** @import { Annotation, Line, Marker, PlainTrace, LegendEntry, Range, SettledFigure, Shape, Size } from "./types.js" */
-
 /** @typedef {(value: number) => number} Scale from data to px inside the axes */
 /** @typedef {{ x: Scale, y: Scale, l: number, t: number, inside: Size }} Frame scales, left and top margin, size inside */
 
-/** @type {(range: Range, start: number, end: number) => Scale} */
+/** @type {(range: Span, start: number, end: number) => Scale} */
 const along =
   ([from, to], start, end) =>
   (value) =>

@@ -1,4 +1,3 @@
-// @ts-check
 // Stribeck curves: at one pressure by state (fig. 7b) or at one state by pressure (fig. 6a), and as surfaces over pressure of one
 // state (figs. 6b, 8) or of several (fig. 7a), or over cycles.
 
@@ -9,9 +8,7 @@ import { faint, pressureRampOf, rampOf, scaleOf } from "./palette.js";
 import { curveOf, inUnit, measuredOf, xyOf } from "./stribeck_law.js";
 import { planar, solid, spatialPoints, surfaceOf, titled } from "./traces.js";
 
-/** @import { Channels, ClutchOut, StribeckItem } from "../shared/types.js" */
 /** @import { CurvePoint } from "./stribeck_law.js" */
-/** @import { Cell, Colours, PlainTrace, Spec, Trace } from "./types.js" */
 
 /** @typedef {{ tests: StribeckItem[], channels: Record<string, Channels>, clutch: ClutchOut, pressure?: number }} Answers channels by run */
 /** @typedef {{ cycles: number, pressure: number, measured: CurvePoint[], fitted: CurvePoint[] }} Drawn */

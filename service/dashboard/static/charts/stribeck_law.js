@@ -1,9 +1,6 @@
-// @ts-check
 // Eq. 1 and 3 once more, for drawing: torque over speed from fitted parameters, and the measured points beside it.
 
 import { meanRadius, units } from "../shared/units.js";
-
-/** @import { Channels, ClutchOut, Fit, Parameters } from "../shared/types.js" */
 
 /** @typedef {{ speed: number, torque: number }} CurvePoint rpm, Nm */
 
@@ -11,7 +8,7 @@ const GAMMA = 0.3;
 
 /**
  * Eq. 3: M_s (1 + (M̄_c − 1) exp(−V_S/v)) + C_v v^0.3, Nm at v ≥ 0 m/s.
- * @type {(v: number, parameters: Parameters) => number}
+ * @type {(v: number, parameters: StribeckParameters) => number}
  */
 function torqueAt(v, parameters) {
   const { static_torque_nm: mS, coulomb_ratio: mC, stribeck_velocity_m_s: vS, viscous_coefficient: cV } = parameters;

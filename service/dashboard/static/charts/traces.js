@@ -1,13 +1,9 @@
-// @ts-check
 // The traces that several charts draw: bands between two edges, and points or lines with error bars.
 
 import { pressureText } from "../shared/units.js";
 import { distinct, HALF_OF_90 } from "./columns.js";
 import { eventMarks } from "./layout.js";
 import { faint, pressureRampOf } from "./palette.js";
-
-/** @import { Measured, Receipt } from "../shared/types.js" */
-/** @import { Axis, Colours, ErrorBars, Figure, Line, PlainTrace, Trace } from "./types.js" */
 
 /** @typedef {(number | null)[]} Values */
 /** @typedef {{ x: Values, y: Values }} Places */

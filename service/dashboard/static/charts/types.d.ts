@@ -1,44 +1,43 @@
 // What charts are made of, as far as these pages use it: what a chart shows, the plotting library's data and layout, and the
-// little of the library itself that is called. For the checks alone; browsers never load this file.
+// little of the library itself that is called. For the checks alone, which know these types in
+// every module; browsers never load this file.
 
-import type { NAMES } from "./palette.js";
-
-export type Cell = string | number | null | undefined;
+type Cell = string | number | null | undefined;
 
 /** A column of a chart's table; `text` writes a number for a reader, the CSV has it raw. */
-export interface Column {
+interface Column {
   name: string;
   text?: (value: number) => string;
 }
 
 /** What a chart shows: a drawing with its table, or what is missing and how to get it. */
-export type Spec =
+type Spec =
   | { empty: string; note?: undefined; columns?: undefined; rows?: undefined; figure?: undefined }
   | { empty?: undefined; note: string; columns: Column[]; rows: Cell[][]; figure: (colours: Colours) => Figure };
 
 /** Colours as CSS; `ramp` gives one between fresh (0) and worn (1), `pressureRamp` between the lowest and the highest pressure. */
-export type Colours = Record<(typeof NAMES)[number], string> &
+type Colours = Record<(typeof import("./palette.js").NAMES)[number], string> &
   Record<"ramp" | "pressureRamp", (share: number) => string>;
-export type Scheme = "light" | "dark" | null;
+type Scheme = "light" | "dark" | null;
 
-export interface Figure {
+interface Figure {
   data: Trace[];
   layout: Layout;
 }
 
-export interface Line {
+interface Line {
   color?: string;
   width?: number;
   dash?: string;
 }
 
-export interface Marker {
+interface Marker {
   color?: string;
   size: number;
   line?: { color: string; width: number };
 }
 
-export interface ErrorBars {
+interface ErrorBars {
   type: "data";
   array: number[];
   color: string;
@@ -47,7 +46,7 @@ export interface ErrorBars {
 }
 
 /** Lines, points or a band over one pair of axes: what can be drawn without the library. */
-export interface PlainTrace {
+interface PlainTrace {
   type?: "scatter";
   mode: string;
   x: (number | null)[];
@@ -66,17 +65,17 @@ export interface PlainTrace {
   yaxis?: string;
 }
 
-export interface OtherTrace {
+interface OtherTrace {
   type: "surface" | "scatter3d" | "heatmap";
   [name: string]: unknown;
 }
 
-export type Trace = PlainTrace | OtherTrace;
-export type Range = [number, number];
+type Trace = PlainTrace | OtherTrace;
+type Span = [number, number];
 
-export interface Axis {
+interface Axis {
   title?: { text?: string; standoff?: number; font?: { size: number } };
-  range?: Range;
+  range?: Span;
   rangemode?: "tozero";
   gridcolor?: string;
   linecolor?: string;
@@ -84,7 +83,7 @@ export interface Axis {
 }
 
 /** A line; `paper` counts from 0 to 1 over the whole chart. */
-export interface Shape {
+interface Shape {
   type: "line";
   x0: number;
   x1: number;
@@ -95,7 +94,7 @@ export interface Shape {
   line: Required<Line>;
 }
 
-export interface Annotation {
+interface Annotation {
   x: number;
   y: number;
   xref?: "paper";
@@ -109,7 +108,7 @@ export interface Annotation {
 }
 
 /** A chart's own layout. */
-export interface Layout {
+interface Layout {
   xaxis?: Axis;
   yaxis?: Axis;
   scene?: Record<"xaxis" | "yaxis" | "zaxis", Axis>;
@@ -121,24 +120,24 @@ export interface Layout {
 }
 
 /** A layout with all that the house adds. */
-export interface WholeLayout extends Layout {
+interface WholeLayout extends Layout {
   font: { family: string; size: number; color: string };
   margin: Record<"l" | "r" | "t" | "b", number>;
   legend: { font: { size: number }; [name: string]: unknown };
   paper_bgcolor: string;
 }
 
-export interface WholeFigure {
+interface WholeFigure {
   data: Trace[];
   layout: WholeLayout;
 }
 
-export interface Tick {
+interface Tick {
   at: number;
   text: string;
 }
 
-export interface LegendEntry {
+interface LegendEntry {
   trace: PlainTrace;
   width: number;
   x: number;
@@ -146,26 +145,24 @@ export interface LegendEntry {
 }
 
 /** A figure whose axes, ticks and legend have their places before anything is drawn. */
-export interface SettledFigure {
+interface SettledFigure {
   data: PlainTrace[];
-  layout: WholeLayout & Record<"xaxis" | "yaxis", Axis & { range: Range }>;
+  layout: WholeLayout & Record<"xaxis" | "yaxis", Axis & { range: Span }>;
   ticks: Record<"x" | "y", Tick[]>;
   legend: { entries: LegendEntry[]; top: number };
 }
 
-export interface Size {
+interface Size {
   width: number;
   height: number;
 }
 
 /** What is called of the plotting library. */
-export interface Plotting {
+interface Plotting {
   react(place: HTMLElement, data: Trace[], layout: Layout, config: object): Promise<unknown>;
   purge(place: HTMLElement): void;
   toImage(figure: HTMLElement | Figure, options: Size & { format: "png"; scale: number }): Promise<string>;
 }
 
-declare global {
-  /** Set by plotly.min.js. */
-  var Plotly: Plotting | undefined;
-}
+/** Set by plotly.min.js. */
+declare var Plotly: Plotting | undefined;

@@ -1,4 +1,3 @@
-// @ts-check
 // Changes to what is stored: a run is confirmed, corrected, withdrawn or restored, a clutch archived or brought back. Each is
 // asked about, made, said at the foot of the window with the way back (the next change takes its place), and read again.
 // Nothing is ever deleted.
@@ -9,8 +8,6 @@ import { asked } from "../shared/dialog.js";
 import { button, field, h } from "../shared/dom.js";
 import { fixed, kindName } from "../shared/format.js";
 import { problemView } from "../shared/problem_view.js";
-
-/** @import { DeclaredEnd, InspectionOut, Receipt } from "../shared/types.js" */
 
 /** @typedef {"confirm" | "correct" | "reread" | "withdraw" | "restore"} RunAction */
 /** @typedef {{ text: string, undo: (() => Promise<Done>) | null }} Done what was done, in a sentence, and how it is undone */

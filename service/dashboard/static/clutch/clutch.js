@@ -1,4 +1,3 @@
-// @ts-check
 // The page of one clutch: what is known and what to do stand first, then tabs that read their answers when they are opened.
 // Open this file first, then head.js (the first lines), reader.js (what is read) and a tab: overview.js, curves.js, loops.js,
 // runs.js, history.js; changes.js says what may be changed, report.js makes the printed page.
@@ -23,7 +22,6 @@ import { makeReport } from "./report.js";
 import { runsTab } from "./runs.js";
 
 /** @import { Chart } from "../charts/chart.js" */
-/** @import { ClutchOut } from "../shared/types.js" */
 /** @import { Asked } from "./changes.js" */
 
 /** @typedef {{ reader: Reader, done: (asked: Asked) => Promise<void> }} Page what every tab is given; `done`: changes something */

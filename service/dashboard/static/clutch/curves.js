@@ -1,4 +1,3 @@
-// @ts-check
 // The tab of the Stribeck curves: curves by state or pressure, in 3D, and their four parameters over cycles and pressure.
 
 import { Chart, chooser, setControls } from "../charts/chart.js";
@@ -10,7 +9,6 @@ import { within } from "../shared/dom.js";
 
 /** @import { ParameterName } from "../charts/parameters.js" */
 /** @import { Depth } from "../charts/stribeck.js" */
-/** @import { DegradationItem, Receipt, StribeckItem } from "../shared/types.js" */
 /** @import { Page, Tab } from "./clutch.js" */
 
 /** Most tests whose records the surface over cycles draws. */

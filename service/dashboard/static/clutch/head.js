@@ -1,12 +1,9 @@
-// @ts-check
 // What stands first on a clutch's page: its name, what is known and what to do, both as the service says them.
 
 import { limitText, placeText } from "../quantities/criteria.js";
 import { h, menu } from "../shared/dom.js";
 import { fixed, percent, words } from "../shared/format.js";
 import { heldText, stateIcon } from "../shared/state.js";
-
-/** @import { ClutchOut } from "../shared/types.js" */
 
 /**
  * @param {ClutchOut} clutch

@@ -1,4 +1,3 @@
-// @ts-check
 // The tab of what has been: remaining life as it was predicted at each test, inspections, and the audit trail (who changed
 // what, when and why; the newest first, page by page).
 
@@ -12,7 +11,6 @@ import { fixed, moment, words } from "../shared/format.js";
 import { askInspection } from "./changes.js";
 import { runLink } from "./warnings.js";
 
-/** @import { Change, Receipt } from "../shared/types.js" */
 /** @import { Page, Tab } from "./clutch.js" */
 
 const PAGE = 20;

@@ -1,4 +1,3 @@
-// @ts-check
 // The tab of the friction loops: torque over speed by state or pressure, and the lag of friction over cycles and pressure.
 
 import { Chart, chooser, setControls } from "../charts/chart.js";
@@ -13,7 +12,6 @@ import { byId, within } from "../shared/dom.js";
 import { BY } from "./curves.js";
 
 /** @import { LagName } from "../quantities/lag.js" */
-/** @import { DegradationItem, LoopItem, Receipt, StribeckItem } from "../shared/types.js" */
 /** @import { Page, Tab } from "./clutch.js" */
 
 /** @typedef {{ over: "state" | "pressure", pressure?: number, run?: string }} OfLoops */

@@ -1,4 +1,3 @@
-// @ts-check
 // The first tab: runs that wait for someone, the state in figures, the forecast with its safe bound, mean COF beside the shudder
 // margin, and what limits the life first.
 
@@ -19,7 +18,6 @@ import { plannedDuty } from "./planned_duty.js";
 import { heldView, warningsView } from "./warnings.js";
 
 /** @import { Content } from "../shared/dom.js" */
-/** @import { ClutchOut, CourseShare, CriterionOutcome, DegradationItem, Receipt, RemainingLife } from "../shared/types.js" */
 /** @import { Page, Tab } from "./clutch.js" */
 
 /** @type {(place: HTMLElement, page: Page) => Tab} */

@@ -1,12 +1,9 @@
-// @ts-check
 // Planned duty: a form of blocks and a pace, and the remaining life under them. Nothing of it is stored.
 
 import { clutchPath, Problem, sendJson } from "../shared/api.js";
 import { button, field, h, quiet, scrolling, table } from "../shared/dom.js";
 import { fixed, NOT_A_NUMBER, numberOf, significant, sentence } from "../shared/format.js";
 import { problemView } from "../shared/problem_view.js";
-
-/** @import { PlannedLife, Quantiles } from "../shared/types.js" */
 
 /** @type {[name: string, label: string, value?: string][]} what is typed of a block; left empty it is not sent */
 const OF_BLOCK = [

@@ -1,11 +1,9 @@
-// @ts-check
 // What the page has read of its clutch: each answer of the API once for a state of the clutch, when a tab first needs it.
 
 import { byMeanCof } from "../quantities/criteria.js";
 import { clutchPath, read, readAll, readDrawn } from "../shared/api.js";
 
 /** @import { Prediction } from "../charts/fan.js" */
-/** @import { Channels, ClutchOut, Degradation, LoopItem, Receipt, RemainingLife, SeriesItem, StribeckItem } from "../shared/types.js" */
 
 export class Reader {
   /** @param {string} id */

@@ -1,4 +1,3 @@
-// @ts-check
 // The one-page report: made beside the page whenever it changes, shown in print only, always in the light scheme.
 
 import { sentence } from "../diagnosis/report.js";
@@ -8,7 +7,6 @@ import { atLeast, estimate, fixed, likely, moment, percent, probability, words }
 import { stateIcon } from "../shared/state.js";
 
 /** @import { Chart } from "../charts/chart.js" */
-/** @import { ClutchOut, Receipt, RemainingLife, StribeckItem } from "../shared/types.js" */
 
 /** The service's release, which the page names. */
 const RELEASE = document.querySelector("meta[name=release]")?.getAttribute("content") ?? "";

@@ -1,4 +1,3 @@
-// @ts-check
 // A run opened: its curves with their fits, what the fits leave, and the record as it was sent.
 
 import { Chart, choice, setControls } from "../charts/chart.js";
@@ -11,8 +10,6 @@ import { h } from "../shared/dom.js";
 import { fixed, quantity } from "../shared/format.js";
 import { named, pressureText, units } from "../shared/units.js";
 
-/** @import { Spec } from "../charts/types.js" */
-/** @import { Channels, ClutchOut, Receipt } from "../shared/types.js" */
 /** @import { Reader } from "./reader.js" */
 
 /** @type {(run: Receipt, reader: Reader) => Promise<HTMLElement | null>} null for a run without channels */

@@ -1,4 +1,3 @@
-// @ts-check
 // The tab of the runs: every run with its state, its receipt, its curves and what can be done to it, the latest cycles first, page
 // by page. `#/runs/RUN` opens one.
 
@@ -10,7 +9,6 @@ import { askUndo, isCorrected, stateMark } from "./changes.js";
 import { buttons } from "./warnings.js";
 import { runCharts } from "./run_view.js";
 
-/** @import { Receipt } from "../shared/types.js" */
 /** @import { Page, Tab } from "./clutch.js" */
 
 /** Runs on a page of the list. */

@@ -1,4 +1,3 @@
-// @ts-check
 // What stands at the top of the page because it is odd: runs that are held, with their doubts and what can be done, and warnings
 // about the course of the life, in words, each with the run that it belongs to.
 
@@ -7,7 +6,6 @@ import { button, h, quiet } from "../shared/dom.js";
 import { fixed, kindName, moment, sentence, words } from "../shared/format.js";
 import { actionsOf, answerDoubts, answersOf, askRun, LABELS } from "./changes.js";
 
-/** @import { Receipt, StribeckItem, Warned } from "../shared/types.js" */
 /** @import { Page } from "./clutch.js" */
 
 const OFF_TRACK = "off_track";

@@ -1,4 +1,3 @@
-// @ts-check
 // Clutches, lives and states over one another: the address names them, so a link leads to the same view; answers of the API go in, two
 // charts come out, a quantity over the cycles of each life and the Stribeck curves of its states, as measured or normalised to new.
 // Its form changes the address, and the address is what is shown.
@@ -16,9 +15,6 @@ import { fixed } from "../shared/format.js";
 import { Live } from "../shared/live.js";
 import { heldText } from "../shared/state.js";
 import { named, placeUnits, pressureText, units } from "../shared/units.js";
-
-/** @import { Colours, Spec } from "../charts/types.js" */
-/** @import { ClutchOut, Degradation, DegradationItem, StribeckItem } from "../shared/types.js" */
 
 /** @typedef {Awaited<ReturnType<typeof lifeOf>>} Life a life of a clutch, as it is compared, with its own tests */
 

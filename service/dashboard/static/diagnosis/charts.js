@@ -1,13 +1,9 @@
-// @ts-check
 // The residuals between data and model, before and after the extension; and the loops under both.
 
 import { Chart } from "../charts/chart.js";
 import { column } from "../charts/columns.js";
 import { titled } from "../charts/traces.js";
 import { fixed, significant } from "../shared/format.js";
-
-/** @import { Axis, Colours, Layout, PlainTrace, Spec, Trace } from "../charts/types.js" */
-/** @import { DiagnosisOut, LoopTraceOut, MapsOut, Table } from "../shared/types.js" */
 
 /** @typedef {"before" | "after"} Side */
 

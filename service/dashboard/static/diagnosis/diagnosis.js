@@ -1,4 +1,3 @@
-// @ts-check
 // The diagnosis: reports of the API go in; verdict, tables, charts and the buttons to run and adopt it come out.
 // Open this file first, then report.js (a report in words and tables) and charts.js (residuals and loops, before and after);
 // the first also shows remaining life before and after the model changes.
@@ -10,8 +9,6 @@ import { words } from "../shared/format.js";
 import { problemView } from "../shared/problem_view.js";
 import { charts } from "./charts.js";
 import { lifeBars, report as reportView } from "./report.js";
-
-/** @import { BeforeAndAfter, DiagnosisListed, DiagnosisOut, ListPage, ModelName } from "../shared/types.js" */
 
 const QUESTION =
   "Do the data and the model disagree beyond noise and run-to-run scatter? If so: where, and which physical cause accounts for it?";

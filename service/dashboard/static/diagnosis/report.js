@@ -1,4 +1,3 @@
-// @ts-check
 // A finished report in words and tables; remaining life before and after on one scale.
 
 import { clutchPath } from "../shared/api.js";
@@ -20,7 +19,6 @@ import { VERDICTS } from "../shared/state.js";
 import { intervalBar } from "../shared/sparkline.js";
 
 /** @import { Content } from "../shared/dom.js" */
-/** @import { CandidateOut, DiagnosisOut, GainOut, MisfitOut, Quantiles } from "../shared/types.js" */
 
 /** @type {Record<string, (causes: string) => string>} */
 const SENTENCES = {

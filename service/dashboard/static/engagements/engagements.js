@@ -1,4 +1,3 @@
-// @ts-check
 // The section of the measured engagements: their answer of the API goes in, two charts and the choices above them come out:
 // an indicator over the life, and one engagement beside what the tracked model gives for the same pressure and drive.
 
@@ -8,9 +7,6 @@ import { lineOf, measuredLine, planar } from "../charts/traces.js";
 import { INDICATORS, stateOptions } from "../quantities/names.js";
 import { clutchPath, Problem, read } from "../shared/api.js";
 import { fixed, percent, significant } from "../shared/format.js";
-
-/** @import { Colours, PlainTrace, Spec } from "../charts/types.js" */
-/** @import { ComparedEngagement, EngagementOut, EngagementTrace, MeasuredEngagement, Receipt } from "../shared/types.js" */
 
 /** The channels of a trace: what it is, and its unit. */
 const CHANNELS = {

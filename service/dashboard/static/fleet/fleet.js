@@ -1,4 +1,3 @@
-// @ts-check
 // The page of all clutches: of the list of the API the part in sight goes in, and how many clutches there are; rows, worst
 // first, come out. Searching, filtering and sorting are the service's.
 // Open this file first (what is asked for and shown), then rows.js (which rows are drawn) and row.js (one of them).
@@ -17,7 +16,6 @@ import { welcome } from "../shared/welcome.js";
 import { Rows } from "./rows.js";
 
 /** @import { StateName } from "../shared/state.js" */
-/** @import { ClutchOut, FleetTotals, ListPage } from "../shared/types.js" */
 /** @import { Part } from "./rows.js" */
 
 const INTERVAL = 3000; // ms

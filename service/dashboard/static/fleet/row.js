@@ -1,4 +1,3 @@
-// @ts-check
 // One clutch in the fleet's table.
 
 import { h } from "../shared/dom.js";
@@ -8,7 +7,6 @@ import { heldText, stateIcon, STATES, VERDICTS } from "../shared/state.js";
 
 /** @import { Content } from "../shared/dom.js" */
 /** @import { StateName } from "../shared/state.js" */
-/** @import { ClutchOut, ClutchSummary } from "../shared/types.js" */
 
 /** @type {[Content, string][]} a column's title and width */
 export const COLUMNS = [

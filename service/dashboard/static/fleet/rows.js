@@ -1,11 +1,8 @@
-// @ts-check
 // The rows of the table: only those about the part of the list that is in sight are read and drawn, whatever its length.
 // What lies above and below them is empty space of the height that they would take.
 
 import { h } from "../shared/dom.js";
 import { COLUMNS, kindOf, row } from "./row.js";
-
-/** @import { ClutchOut } from "../shared/types.js" */
 
 /**
  * @typedef {object} Entry a clutch that is drawn

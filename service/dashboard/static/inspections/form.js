@@ -1,4 +1,3 @@
-// @ts-check
 // The form that sends an inspection: its measurements first, then each photograph. What is sent again is known already, so
 // that a form whose photographs were refused in part is mended and sent once more.
 
@@ -6,8 +5,6 @@ import { send, sendJson } from "../shared/api.js";
 import { field, h, symbol } from "../shared/dom.js";
 import { fixed } from "../shared/format.js";
 import { attempted, problemView } from "../shared/problem_view.js";
-
-/** @import { InspectionOut } from "../shared/types.js" */
 
 const TYPES = ["image/png", "image/jpeg", "image/webp"];
 /** The note of an inspection that has nothing but photographs. */

@@ -1,4 +1,3 @@
-// @ts-check
 // The section of the inspections: their list goes in; R_a and R_sk over cycles, a table, photographs by state and a form come
 // out. Open this file first, then photographs.js (thumbnails, and one opened larger) and form.js (an inspection sent with its
 // photographs).
@@ -13,9 +12,6 @@ import { files } from "../shared/files.js";
 import { fixed, moment, significant } from "../shared/format.js";
 import { inspectionForm } from "./form.js";
 import { gallery } from "./photographs.js";
-
-/** @import { Spec } from "../charts/types.js" */
-/** @import { InspectionOut, Receipt } from "../shared/types.js" */
 
 /** The quantities: the axis' title, and what their course says. */
 const QUANTITIES = {

@@ -1,4 +1,3 @@
-// @ts-check
 // The photographs of the inspections as thumbnails, by state; each opens larger. Their files are read with the reader's key
 // when they come to the screen, one after the other, and kept by the browser: a photograph never changes. Of each the page
 // keeps a drawing as small as its thumbnail, and the whole of one while it is open.
@@ -6,8 +5,6 @@
 import { readFile } from "../shared/api.js";
 import { answered, button, h } from "../shared/dom.js";
 import { fixed } from "../shared/format.js";
-
-/** @import { InspectionOut } from "../shared/types.js" */
 
 /** @typedef {{ path: string, text: string }} Shown a photograph's address, and what it shows in words */
 

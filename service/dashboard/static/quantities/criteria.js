@@ -1,4 +1,3 @@
-// @ts-check
 // Quantities that are tracked and may end a life: answers of the API go in, charts and tables come out. Open this file first (what
 // ends a life: its criteria, when each is reached, and how probably it is the first), then shudder.js, lag.js and pressure_laws.js;
 // lazy.js reads an answer that takes seconds when its chart is looked at, and again only when the clutch has changed.
@@ -7,8 +6,6 @@ import { h, scrolling, table } from "../shared/dom.js";
 import { cycles, fixed, interval, percent, probability, significant, withSd } from "../shared/format.js";
 import { pressureText } from "../shared/units.js";
 import { QUANTITIES } from "./names.js";
-
-/** @import { CriterionIn, CriterionOutcome, RemainingLife } from "../shared/types.js" */
 
 /** What is known of one criterion by itself: the columns of `criterionRow`. */
 export const OWN_COLUMNS = [

@@ -1,4 +1,3 @@
-// @ts-check
 // The lag of friction behind its stationary curve over life: over cycles (figs. 15 to 17), and over pressure (figs. 13, 14).
 
 import {
@@ -17,9 +16,6 @@ import { linesByPressure, measuredLine, planar, tracked } from "../charts/traces
 import { fixed } from "../shared/format.js";
 import { pressureText } from "../shared/units.js";
 import { levelsOf, QUANTITIES } from "./names.js";
-
-/** @import { DegradationItem, Receipt } from "../shared/types.js" */
-/** @import { Colours, Column, PlainTrace, Spec } from "../charts/types.js" */
 
 /** @typedef {"loop_area" | "attractor" | "film_time"} LagName */
 

@@ -1,4 +1,3 @@
-// @ts-check
 // An answer that takes the service seconds: read when its section is looked at, and again only when another one is wanted.
 
 import { Problem } from "../shared/api.js";

@@ -1,12 +1,9 @@
-// @ts-check
 // The quantities that are tracked along a life and may end it, and what is chosen of them above charts.
 
 import { distinct } from "../charts/columns.js";
 import { PARAMETERS } from "../charts/parameters.js";
 import { fixed } from "../shared/format.js";
 import { pressureText } from "../shared/units.js";
-
-/** @import { DegradationItem } from "../shared/types.js" */
 
 /** The pressure that is shown first is the one closest to this, bar. */
 const USUAL_PRESSURE = 5;

@@ -1,4 +1,3 @@
-// @ts-check
 // A Stribeck parameter of one test over pressure, its law (fig. 9) and how far the test determines it.
 
 import { column, HALF_OF_90, intervalColumns, KIND } from "../charts/columns.js";
@@ -7,8 +6,6 @@ import { measuredPoints, planar, tracked } from "../charts/traces.js";
 import { fixed } from "../shared/format.js";
 
 /** @import { ParameterName } from "../charts/parameters.js" */
-/** @import { AsymptoticLaw, LinearLaw, StribeckItem } from "../shared/types.js" */
-/** @import { Spec } from "../charts/types.js" */
 
 const POINTS = 60;
 

@@ -1,4 +1,3 @@
-// @ts-check
 // Remaining life by any tracked quantity: a choice of quantity and pressure, answered when it is made. Nothing is stored.
 
 import { chooser, setControls } from "../charts/chart.js";
@@ -11,8 +10,6 @@ import { problemView } from "../shared/problem_view.js";
 import { criterionRow, OWN_COLUMNS } from "./criteria.js";
 import { LAG_NAMES } from "./lag.js";
 import { levelOptions, QUANTITIES, usual } from "./names.js";
-
-/** @import { CriterionOutcome, LoopItem, RemainingLife, StribeckItem } from "../shared/types.js" */
 
 /** @type {string[]} */
 const OF_CURVES = ["mean_cof", ...PARAMETER_NAMES, "slope"];

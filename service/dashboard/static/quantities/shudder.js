@@ -1,4 +1,3 @@
-// @ts-check
 // The shudder margin: the slope dμ/dv of the fitted curves over cycles. Below zero friction falls with speed.
 
 import { CYCLES, column, intervalColumns, KIND, measuredAndLaw, PRESSURE } from "../charts/columns.js";
@@ -6,9 +5,6 @@ import { measuredPoints, planar, tracked } from "../charts/traces.js";
 import { fixed } from "../shared/format.js";
 import { pressureText } from "../shared/units.js";
 import { reachedText } from "./criteria.js";
-
-/** @import { CriterionOutcome, DegradationItem, Receipt } from "../shared/types.js" */
-/** @import { Colours, PlainTrace, Spec } from "../charts/types.js" */
 
 const COLUMNS = [KIND, PRESSURE, column("speed, rpm"), CYCLES, ...intervalColumns("dμ/dv, s/m", 3)];
 

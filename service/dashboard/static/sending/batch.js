@@ -1,4 +1,3 @@
-// @ts-check
 // Dropped files -> the runs among them: JSON runs, records, and what a campaign's folder says of both (`runs.json`,
 // `clutch.json`, as `clutchlife simulate` writes them).
 

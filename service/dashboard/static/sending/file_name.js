@@ -1,4 +1,3 @@
-// @ts-check
 // What a file's name says of its run: the kind of test and its duty cycles, each null where the name leaves a doubt.
 
 /** @typedef {{ kind: string | null, cycles: number | null }} Guess */

@@ -1,4 +1,3 @@
-// @ts-check
 // How one file is read: its first rows, each column with its channel, unit and scale to choose from, what will be cut and
 // fitted, drawn before anything is sent; and the rig profile that the choices are kept in.
 
@@ -9,7 +8,6 @@ import { problemView } from "../shared/problem_view.js";
 import { warnings } from "./receipt.js";
 
 /** @import { Content } from "../shared/dom.js" */
-/** @import { Preview, PreviewColumn, RigColumn, RigProfile } from "../shared/types.js" */
 
 /** Rows that are shown. */
 const ROWS = 5;

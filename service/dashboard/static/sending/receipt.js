@@ -1,4 +1,3 @@
-// @ts-check
 // What the service made of a run: the curve, the fits, the warnings.
 
 import { curveOf, measuredOf } from "../charts/stribeck_law.js";
@@ -7,7 +6,6 @@ import { h, scrolling, svg, symbol, table } from "../shared/dom.js";
 import { cycles, fixed, kindName, sentence, significant, withSd, words } from "../shared/format.js";
 
 /** @import { CurvePoint } from "../charts/stribeck_law.js" */
-/** @import { ClutchOut, Fit, Loop, Parameters, Receipt, RunOut, Warned } from "../shared/types.js" */
 
 /** What is said of a run that does not count, by its state: that, and where on the clutch's page it is made to count. */
 const UNCOUNTED = {
@@ -71,7 +69,7 @@ const FIT_COLUMNS = () => [
 /** @param {Fit[]} fits */
 export function fitTable(fits) {
   const rows = fits.map((fit) => {
-    /** @param {keyof Parameters} name */
+    /** @param {keyof StribeckParameters} name */
     const value = (name) =>
       fit.undetermined.includes(name) ? "not determined" : withSd(fit.parameters[name], fit.standard_errors[name]);
     return [

@@ -1,11 +1,8 @@
-// @ts-check
 // A clutch is registered by a form that is submitted, never by a name that was typed: all its values are shown first.
 
 import { sendJson } from "../shared/api.js";
 import { answered, button, field, h, quiet } from "../shared/dom.js";
 import { problemView } from "../shared/problem_view.js";
-
-/** @import { ClutchIn } from "../shared/types.js" */
 
 /** @typedef {{ [Key in keyof ClutchIn]?: Partial<ClutchIn[Key]> }} ClutchRecord a clutch as the API takes it */
 

@@ -1,4 +1,3 @@
-// @ts-check
 // One file that is to be sent: what it is, as far as it or its name says so; and what the service made of it.
 
 import { clutchPath, Problem, send, sendJson } from "../shared/api.js";
@@ -8,8 +7,6 @@ import { problemView } from "../shared/problem_view.js";
 import { guess } from "./file_name.js";
 import { importer } from "./importer.js";
 import { outcomeOf, receiptView } from "./receipt.js";
-
-/** @import { Receipt } from "../shared/types.js" */
 
 /** @typedef {Record<string, unknown> & { kind: string, cycles?: number, clutch_id?: string }} JsonRun a run as the API takes it */
 /** @typedef {Record<string, string>} Listed what a list of runs (`runs.json`) says of a file */

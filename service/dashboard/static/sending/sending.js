@@ -1,4 +1,3 @@
-// @ts-check
 // Sending runs: files that are dropped or chosen go in; for each its receipt, or every place where it is wrong, comes out.
 // Open this file first: the dialog. Then batch.js (which files are runs), run_file.js (one of them), file_name.js (what its
 // name says), importer.js (how it is read), registration.js (a clutch that is not known yet) and receipt.js (what the service made of a run).

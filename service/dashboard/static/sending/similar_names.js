@@ -1,9 +1,6 @@
-// @ts-check
 // Names of registered clutches that are spelt almost as another: what a slip of typing makes of them.
 
 import { read } from "../shared/api.js";
-
-/** @import { ClutchOut, ListPage } from "../shared/types.js" */
 
 /** Names that are offered while one is typed, and looked through for what may have been meant. */
 const OFFERED = 20;

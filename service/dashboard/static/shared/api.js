@@ -1,9 +1,6 @@
-// @ts-check
 // Shared by both pages: answers of the API go in; values, elements, texts and states come out. Nothing here imports another
-// chapter. Open this file first (the reader's key, entity tags, errors as values), then dom.js and format.js; the shapes of
-// the API's answers are in types.d.ts.
-
-/** @import { ListPage, ProblemError, RunOut } from "./types.js" */
+// chapter. Open this file first (the reader's key, entity tags, errors as values), then dom.js and format.js; the types of
+// the API's answers are those of the OpenAPI document (tests/javascript/types.py).
 
 /** The path of the service, with a slash at its end: modules lie in assets/DIGEST/FOLDER below it. */
 const ROOT = new URL("../../../", import.meta.url).pathname;

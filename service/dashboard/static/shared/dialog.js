@@ -1,4 +1,3 @@
-// @ts-check
 // Questions in a dialog: each has a form that is sent, or is left.
 
 import { answered, button, h } from "./dom.js";

@@ -1,4 +1,3 @@
-// @ts-check
 // Elements without a framework. Text is always text: nothing that comes from outside is ever parsed as HTML.
 
 /**

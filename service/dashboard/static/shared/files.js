@@ -1,10 +1,7 @@
-// @ts-check
 // Tables that the reader takes along: CSV after RFC 4180, and XLSX, a zip of four small XML files, numbers as numbers.
 
 import { readText } from "./api.js";
 import { button, h, saveBlob } from "./dom.js";
-
-/** @typedef {string | number | null | undefined} Cell */
 
 /**
  * A table of the API as links that save it. With a key a plain link would be refused: the page fetches it as everything else.

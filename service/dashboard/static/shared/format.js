@@ -1,8 +1,5 @@
-// @ts-check
 // Numbers as a person reads them: grouped, with their unit, and with no more digits than their uncertainty allows.
 // A dash stands wherever a value is null, undefined or not finite.
-
-/** @import { Quantiles } from "./types.js" */
 
 /** @typedef {number | null | undefined} Maybe a number, or none */
 

@@ -1,4 +1,3 @@
-// @ts-check
 // Polls the service: less often while errors last, not at all in a hidden tab, at once when someone looks again. How old the
 // answers are is always in sight, with words for a screen reader only when the state changes.
 

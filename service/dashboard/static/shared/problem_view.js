@@ -1,4 +1,3 @@
-// @ts-check
 // A problem as the reader sees it, with every place that is wrong in what was sent.
 
 import { Problem } from "./api.js";

@@ -1,9 +1,6 @@
-// @ts-check
 // Small drawings in a row of the fleet: plain SVG, no plotting library.
 
 import { svg } from "./dom.js";
-
-/** @import { Quantiles } from "./types.js" */
 
 const WIDTH = 120;
 const HEIGHT = 28;

@@ -1,9 +1,6 @@
-// @ts-check
 // The state of a clutch, after NAMUR NE 107, as the service says it: one of five, each with its own word, shape and colour.
 
 import { svg } from "./dom.js";
-
-/** @import { ClutchState } from "./types.js" */
 
 /** @typedef {ClutchState["name"]} StateName */
 

@@ -1,4 +1,3 @@
-// @ts-check
 // Light, dark, or as the system says. A plain script in the head, so that the page never flashes in the wrong one.
 "use strict";
 (() => {

@@ -1,11 +1,8 @@
-// @ts-check
 // Units that the reader chooses, kept by the browser: friction as torque or as coefficient, SI or US. Files name the unit that they hold.
 
 import { kept } from "./api.js";
 import { menu } from "./dom.js";
 import { fixed } from "./format.js";
-
-/** @import { ClutchOut } from "./types.js" */
 
 /** @typedef {{ name: string, unit: string, decimals: number, of: (value: number, bar?: number, clutch?: Pick<ClutchOut, "geometry">) => number }} Unit */
 

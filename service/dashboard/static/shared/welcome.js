@@ -1,4 +1,3 @@
-// @ts-check
 // What a first visitor sees: what to do next, and the command for it.
 
 import { here } from "./api.js";
