@@ -124,7 +124,7 @@ def test_several_files_each_have_their_outcome(watched: Watched, server: Server)
     more = [url for url in watched.asked if "/runs" in url and "?limit" not in url][len(posted) :]
     assert ["cycles=3000" in url for url in more] == [True]
     file_in(dialog, "measured.csv").get_by_text("Receipt").click()
-    file_in(dialog, "measured.csv").locator("svg.curve").wait_for()
+    file_in(dialog, "measured.csv").locator(".receipt svg.curve").wait_for()
     page.keyboard.press("Escape")
     expect(dialog).to_have_count(0)
 
@@ -168,7 +168,7 @@ def test_a_clutch_is_registered_by_the_form(watched: Watched, server: Server) ->
     page.keyboard.press("Enter")
     dialog.locator("svg.curve").wait_for()
     assert dialog.locator("svg.curve circle").count() == 160
-    assert dialog.locator("svg.curve path").count() == 4
+    assert dialog.locator("svg.curve path[stroke-width='2']").count() == 4
     assert seen(dialog.locator("svg.curve")).is_chart
     assert dialog.locator("table tbody tr").count() == 4
     record = asked(server, "/dropped")

@@ -1,6 +1,11 @@
 // A chart drawn light: plain SVG, at once, of what the plotting library draws in its place as soon as it has loaded.
 
 import { svg } from "../shared/dom.js";
+import { settled } from "./frame.js";
+import { base } from "./layout.js";
+import { colours } from "./palette.js";
+
+/** @import { Attributes } from "../shared/dom.js" */
 
 /** @typedef {(value: number) => number} Scale from data to px inside the axes */
 /** @typedef {{ x: Scale, y: Scale, l: number, t: number, inside: Size }} Frame scales, left and top margin, size inside */
@@ -11,11 +16,22 @@ const along =
   (value) =>
     start + ((end - start) * (value - from)) / (to - from);
 
+/** What the plotting library draws in its place, and the chart's own text says what it shows. */
+const HIDDEN = { class: "sketch", "aria-hidden": "true" };
+
 /** @param {number} value */
 const px = (value) => value.toFixed(1);
 
-/** @type {(figure: SettledFigure, size: Size) => SVGSVGElement} a settled figure as SVG */
-export function sketch({ data, layout, ticks, legend }, { width, height }) {
+/** @type {(figure: (c: Colours) => Figure, size: Size, text: string) => SVGSVGElement | null} without a chart about it */
+export function drawnAlone(figure, size, text) {
+  const c = colours();
+  const { data, layout } = figure(c);
+  const whole = settled({ data, layout: base(c, layout, { height: size.height, compact: false }) }, size);
+  return whole && sketch(whole, size, { class: "curve", role: "img", "aria-label": text });
+}
+
+/** @type {(figure: SettledFigure, size: Size, own?: Attributes) => SVGSVGElement} a settled figure as SVG */
+export function sketch({ data, layout, ticks, legend }, { width, height }, own = HIDDEN) {
   const { font, margin, paper_bgcolor: ground } = layout;
   const { l, r, t, b } = margin;
   const inside = { width: width - l - r, height: height - t - b };
@@ -24,11 +40,10 @@ export function sketch({ data, layout, ticks, legend }, { width, height }) {
   const frame = { x, y, l, t, inside };
   const axes = `M${l} ${t}V${t + inside.height}H${l + inside.width}`;
   const attributes = {
-    class: "sketch",
+    ...own,
     viewBox: `0 0 ${width} ${height}`,
     width,
     height,
-    "aria-hidden": "true",
     "font-family": font.family,
     "font-size": font.size,
     fill: font.color,

@@ -94,6 +94,12 @@ export function flat(answers) {
   };
 }
 
+/** @type {(run: Receipt, channels: Channels, clutch: ClutchOut) => Spec} the curves of one run */
+export function curvesOfRun(run, channels, clutch) {
+  const tests = [{ ...run, pressure_laws: null }];
+  return flat({ tests, by: "pressure", run: run.run_id, channels: { [run.run_id]: channels }, clutch });
+}
+
 /** @type {(tests: StribeckItem[], drawn: number) => string} that more tests are there than are drawn */
 const leftOut = (tests, drawn) =>
   drawn < tests.length

@@ -3,7 +3,7 @@
 import { Chart, choice, setControls } from "../charts/chart.js";
 import { column } from "../charts/columns.js";
 import { pressureRampOf } from "../charts/palette.js";
-import { flat } from "../charts/stribeck.js";
+import { curvesOfRun } from "../charts/stribeck.js";
 import { measuredOf, torqueAtSpeed } from "../charts/stribeck_law.js";
 import { planar, titled } from "../charts/traces.js";
 import { h } from "../shared/dom.js";
@@ -34,20 +34,10 @@ export async function runCharts(run, reader) {
   };
   draw(names.includes("torque_nm") ? "torque_nm" : names[0]);
   if (run.fits.length === 0) return h("div.charts", record.element);
-  const test = { ...run, pressure_laws: null };
   const curves = new Chart({ name, id: `${id}-curve`, title: "Curve and fit", height: 300 });
   const residuals = new Chart({ name, id: `${id}-residuals`, title: "Residuals of the fit", height: 300 });
   const clutch = reader.present();
-  curves.show(
-    flat({
-      tests: [test],
-      by: "pressure",
-      run: run.run_id,
-      pressure: undefined,
-      channels: { [run.run_id]: channels },
-      clutch,
-    }),
-  );
+  curves.show(curvesOfRun(run, channels, clutch));
   residuals.show(residualsOf(run, channels, clutch));
   return h("div.charts", curves.element, residuals.element, record.element);
 }

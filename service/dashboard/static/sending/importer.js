@@ -1,8 +1,10 @@
 // How one file is read: its first rows, each column with its channel, unit and scale to choose from, what will be cut and
 // fitted, drawn before anything is sent; and the rig profile that the choices are kept in.
 
+import { drawnAlone } from "../charts/sketch.js";
+import { band, planar } from "../charts/traces.js";
 import { send, sendJson } from "../shared/api.js";
-import { button, field, h, quiet, scrolling, select, svg } from "../shared/dom.js";
+import { button, field, h, quiet, scrolling, select } from "../shared/dom.js";
 import { quantity, words } from "../shared/format.js";
 import { problemView } from "../shared/problem_view.js";
 import { warnings } from "./receipt.js";
@@ -225,45 +227,29 @@ export function importer(file, number, run) {
   return { lead, element, decided, rig, look, sent };
 }
 
-const WIDTH = 640;
-const HEIGHT = 160;
-
 /**
  * The record with what is cut of it, or the plateaus; null where nothing is read.
  * @param {Preview} shown
  */
 function drawing({ channels, pieces, fits, kind }) {
   const { time_s: time, torque_nm: torque, speed_rpm: speed } = channels;
-  if (!torque?.length) return null;
-  const along = time ?? speed;
-  if (!along) return null;
-  const x = scale(along, WIDTH);
-  const y = scale([0, ...torque], HEIGHT);
-  const points = along.map((at, index) => `${x(at)},${(HEIGHT - Number(y(torque[index]))).toFixed(1)}`);
-  const cut = pieces.map(({ start_s: start, stop_s: stop }) => {
-    const width = Math.max(1, Number(x(stop)) - Number(x(start)));
-    return svg("rect.cut", { x: x(start), y: 0, width, height: HEIGHT });
-  });
-  const line = time ? svg("polyline.record", { points: points.join(" ") }) : null;
-  const dots = time
-    ? []
-    : points.map((point) => svg("circle", { cx: point.split(",")[0], cy: point.split(",")[1], r: 2 }));
+  const x = time ?? speed;
+  if (!torque?.length || !x) return null;
+  const [low, high] = [Math.min(0, ...torque), Math.max(...torque)];
   const piece = kind === "dynamic_stribeck" ? "stretches of constant pressure" : "plateaus";
-  const parts = [
-    time ? `${pieces.length} ${piece} are cut` : `${torque.length} plateaus`,
-    `${fits.length} curves are fitted`,
-  ];
-  const text = `Torque over ${time ? "time" : "speed"}: ${parts.join(", ")}.`;
-  return h(
-    "figure.cutting",
-    svg("svg", { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, role: "img", "aria-label": text }, cut, line, dots),
-    h("figcaption", text),
-  );
-}
-
-/** @type {(values: number[], size: number) => (value: number) => string} from values to px */
-function scale(values, size) {
-  const low = values.reduce((a, b) => Math.min(a, b));
-  const high = values.reduce((a, b) => Math.max(a, b));
-  return (/** @type {number} */ value) => ((size * (value - low)) / (high - low || 1)).toFixed(1);
+  const found = time ? `${pieces.length} ${piece} are cut` : `${torque.length} plateaus`;
+  const text = `Torque over ${time ? "time" : "speed"}: ${found}, ${fits.length} curves are fitted.`;
+  const figure = planar(time ? "time, s" : "speed, rpm", "torque, Nm", [], (c) => [
+    ...pieces.flatMap(({ start_s: from, stop_s: to }) =>
+      band("", { x: [from, to], y: [low, low] }, { x: [from, to], y: [high, high] }, c),
+    ),
+    {
+      mode: time ? "lines" : "markers",
+      x,
+      y: torque,
+      line: { color: c.accent, width: 1 },
+      marker: { color: c.accent, size: 4 },
+    },
+  ]);
+  return h("figure.cutting", drawnAlone(figure, { width: 760, height: 220 }, text), h("figcaption", text));
 }

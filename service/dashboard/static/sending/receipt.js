@@ -1,11 +1,10 @@
 // What the service made of a run: the curve, the fits, the warnings.
 
-import { curveOf, measuredOf } from "../charts/stribeck_law.js";
+import { drawnAlone } from "../charts/sketch.js";
+import { curvesOfRun } from "../charts/stribeck.js";
 import { clutchPath, read, readDrawn } from "../shared/api.js";
-import { h, scrolling, svg, symbol, table } from "../shared/dom.js";
+import { h, scrolling, symbol, table } from "../shared/dom.js";
 import { cycles, fixed, kindName, sentence, significant, withSd, words } from "../shared/format.js";
-
-/** @import { CurvePoint } from "../charts/stribeck_law.js" */
 
 /** What is said of a run that does not count, by its state: that, and where on the clutch's page it is made to count. */
 const UNCOUNTED = {
@@ -111,55 +110,13 @@ export function loopTable(loops) {
   return scrolling("Loops", table("Loops by pressure", LOOP_COLUMNS, rows));
 }
 
-/** Highest speed of the fitted curves, rpm; they are cut at the highest measured one. */
-const MOST_SPEED = 2000;
-
-/**
- * The measured points and the fitted curves, drawn light: the dialog needs no plotting library.
- * @param {Receipt} receipt
- */
+/** @type {(receipt: Receipt) => Promise<SVGSVGElement | null>} the measured points and the fitted curves */
 async function drawing(receipt) {
-  const { clutch_id: clutchId, run_id: runId } = receipt;
+  const { clutch_id: clutchId, run_id: runId, fits } = receipt;
   /** @type {[{ body: RunOut }, { body: ClutchOut }]} */
   const [run, clutch] = await Promise.all([readDrawn(clutchId, runId), read(clutchPath(clutchId))]);
-  const curves = receipt.fits.map((fit) => ({
-    measured: measuredOf(run.body.channels, fit.pressure_bar),
-    fitted: curveOf(fit, clutch.body, 0, MOST_SPEED),
-  }));
-  const all = curves.flatMap(({ measured }) => measured);
-  if (all.length === 0) return null;
-  const wide = Math.max(...all.map(({ speed }) => speed));
-  const high = 1.05 * Math.max(...all.map(({ torque }) => torque));
-  /** @param {number} speed */
-  const x = (speed) => (46 + (640 * speed) / wide).toFixed(1);
-  /** @param {number} torque */
-  const y = (torque) => (250 - (235 * torque) / high).toFixed(1);
-  /** @param {CurvePoint[]} points */
-  const pathOf = (points) =>
-    points
-      .filter(({ speed }) => speed <= wide)
-      .map(({ speed, torque }, index) => `${index ? "L" : "M"}${x(speed)} ${y(torque)}`)
-      .join("");
-  const label = `Torque over speed: ${all.length} measured points and ${curves.length} fitted curves; the numbers are in the table below`;
-  return svg(
-    "svg.curve",
-    { viewBox: "0 0 700 290", role: "img", "aria-label": label },
-    [0, 0.25, 0.5, 0.75, 1].map((share) =>
-      svg(
-        "g",
-        svg("line.grid", { x1: 46, x2: 686, y1: y(share * high), y2: y(share * high) }),
-        svg("text", { x: 40, y: Number(y(share * high)) + 4, "text-anchor": "end" }, significant(share * high, 2)),
-        svg("text", { x: x(share * wide), y: 267, "text-anchor": "middle" }, fixed(share * wide)),
-      ),
-    ),
-    svg("text", { x: 366, y: 286, "text-anchor": "middle" }, "speed, rpm"),
-    svg("text", { x: 46, y: 11 }, "torque, Nm"),
-    curves.map(({ measured, fitted }) =>
-      svg(
-        "g",
-        measured.map(({ speed, torque }) => svg("circle", { cx: x(speed), cy: y(torque), r: 2 })),
-        svg("path", { d: pathOf(fitted) }),
-      ),
-    ),
-  );
+  const { figure, rows = [] } = curvesOfRun(receipt, run.body.channels, clutch.body);
+  const points = rows.filter(([kind]) => kind === "measured").length;
+  const text = `Torque over speed: ${points} measured points and ${fits.length} fitted curves; the numbers are in the table below`;
+  return figure && points > 0 ? drawnAlone(figure, { width: 760, height: 300 }, text) : null;
 }
