@@ -1,8 +1,8 @@
 // A clutch is registered by a form that is submitted, never by a name that was typed: all its values are shown first.
 
 import { sendJson } from "../shared/api.js";
-import { answered, button, field, h, quiet } from "../shared/dom.js";
-import { problemView } from "../shared/problem_view.js";
+import { asked } from "../shared/dialog.js";
+import { button, field, h, quiet } from "../shared/dom.js";
 
 /** @typedef {{ [Key in keyof ClutchIn]?: Partial<ClutchIn[Key]> }} ClutchRecord a clutch as the API takes it */
 
@@ -52,28 +52,7 @@ export const SECTIONS = [
  *   meant; other values at first; why the form is shown
  * @returns {Promise<string | null>}
  */
-export function register(id, { similar = [], record = null, lead = "" } = {}) {
-  const dialog = h("dialog.registration", { "aria-labelledby": "registration-title" });
-  /** @type {string | null} */
-  let result = null;
-  /** @param {string} chosen */
-  const end = (chosen) => {
-    result = chosen;
-    dialog.close();
-  };
-  const others = similar.map((name) => button(`Send to ${name} instead`, () => end(name)));
-  dialog.append(
-    h("h2", { id: "registration-title" }, "Register a clutch"),
-    lead && h("p.notice", lead),
-    others.length > 0 ? h("p.row.buttons.start", others) : "",
-    quiet("These are the values of the reference clutch. Change the values that differ on your clutch."),
-    form(id, record, end, () => dialog.close()),
-  );
-  return answered(dialog, () => result);
-}
-
-/** @type {(id: string, record: ClutchRecord | null, done: (id: string) => void, cancel: () => void) => HTMLElement} */
-function form(id, record, done, cancel) {
+export async function register(id, { similar = [], record = null, lead = "" } = {}) {
   const attributes = { required: true, autocomplete: "off", autofocus: true, ...IDENTIFIER };
   const name = h("input", { id: "new-id", value: id, ...attributes });
   /** @type {[string, HTMLInputElement][]} by their place in the record */
@@ -86,19 +65,32 @@ function form(id, record, done, cancel) {
     });
     return h("fieldset", h("legend", title), h("div.fields", labelled));
   });
-  const answer = h("div", { "aria-live": "polite" });
-  const submit = async (/** @type {SubmitEvent} */ event) => {
-    event.preventDefault();
-    const chosen = name.value.trim();
-    try {
+  /** @type {string | null} */
+  let meant = null;
+  const others = similar.map((other) =>
+    button(`Send to ${other} instead`, ({ target }) => {
+      meant = other;
+      target.closest("dialog").close();
+    }),
+  );
+  const registered = await asked({
+    title: "Register a clutch",
+    size: "registration",
+    lines: [
+      lead && h("p.notice", lead),
+      others.length > 0 && h("p.row.buttons.start", others),
+      quiet("These are the values of the reference clutch. Change the values that differ on your clutch."),
+    ],
+    fields: [field(name, "Clutch id"), sections],
+    action: "Register this clutch",
+    lead: "Not registered. ",
+    send: async () => {
+      const chosen = name.value.trim();
       await sendJson("POST", "/v1/clutches", recordOf(chosen, inputs, record));
-      done(chosen);
-    } catch (problem) {
-      answer.replaceChildren(problemView(problem, "Not registered. "));
-    }
-  };
-  const buttons = h("div.row.buttons", button("Cancel", cancel), h("button.main", "Register this clutch"));
-  return h("form", { onsubmit: submit }, h("div.fields", field(name, "Clutch id")), sections, answer, buttons);
+      return chosen;
+    },
+  });
+  return meant ?? registered;
 }
 
 /** @type {(field: Field, record: ClutchRecord | null) => HTMLInputElement} */

@@ -12,7 +12,9 @@ import { attempted } from "./problem_view.js";
  * @property {Content[]} [lines] what stands above the form
  * @property {Content} [fields]
  * @property {string} action the button's word
- * @property {string} [leave] the other button's word
+ * @property {string | null} [leave] the other button's word; null: there is none, and the question is not left
+ * @property {string} [size] of the dialog
+ * @property {string} [lead] what has not happened where it is refused
  * @property {() => Promise<Result> | Result} send a Problem of it is shown, and the dialog stays
  */
 
@@ -22,10 +24,11 @@ import { attempted } from "./problem_view.js";
  * @param {Question<Result>} question
  * @returns {Promise<Result | null>}
  */
-export function asked({ title, lines = [], fields = [], action, leave = "Cancel", send }) {
+export function asked({ title, lines = [], fields = [], action, leave = "Cancel", size = "narrow", lead, send }) {
   const answer = h("div.answer", { "aria-live": "polite" });
   const go = h("button.main", action);
-  const dialog = h("dialog.narrow", { "aria-labelledby": "question-title" });
+  const dialog = h("dialog", { class: size, "aria-label": title });
+  if (leave === null) dialog.addEventListener("cancel", (event) => event.preventDefault());
   /** @type {Result | null} */
   let result = null;
   const submit = async (/** @type {SubmitEvent} */ event) => {
@@ -34,12 +37,12 @@ export function asked({ title, lines = [], fields = [], action, leave = "Cancel"
       result = await send();
       dialog.close();
     };
-    await attempted(go, answer, "Computing …", work, "Nothing was changed. ");
+    await attempted(go, answer, "Computing …", work, lead ?? "Nothing was changed. ");
   };
-  const cancel = button(leave, () => dialog.close());
+  const cancel = leave !== null && button(leave, () => dialog.close());
   const form = h("div.fields", fields);
   const buttons = h("div.row.buttons", cancel, go);
-  dialog.append(h("h2", { id: "question-title" }, title), h("div", ...lines));
+  dialog.append(h("h2", title), h("div", ...lines));
   dialog.append(h("form", { onsubmit: submit }, form, answer, buttons));
   return answered(dialog, () => result);
 }

@@ -83,7 +83,7 @@ export function showTab(names, name) {
   }
 }
 
-/** @type {(label: Content, onclick: (() => unknown) | null, attributes?: Attributes) => HTMLButtonElement} */
+/** @type {(label: Content, onclick: ((event: any) => unknown) | null, attributes?: Attributes) => HTMLButtonElement} */
 export const button = (label, onclick, attributes = {}) =>
   h("button", { type: "button", ...attributes, onclick }, label);
 

@@ -2,7 +2,8 @@
 // answers are is always in sight, with words for a screen reader only when the state changes.
 
 import { key, Problem } from "./api.js";
-import { answered, button, byId, h, quiet } from "./dom.js";
+import { asked } from "./dialog.js";
+import { button, byId, field, h, quiet } from "./dom.js";
 import { clock, seconds } from "./format.js";
 
 const MAX_WAIT = 60_000; // ms
@@ -125,21 +126,16 @@ function reason({ status, detail, title }) {
 const ABOUT =
   "Its operator creates a key. The scope read allows you to look; the scope ingest also allows you to send:";
 
-/** @type {(detail: string) => Promise<void>} resolves when a key has been given; `detail`: why it is asked for */
+/** @type {(detail: string) => Promise<unknown>} resolves when a key has been given; `detail`: why it is asked for */
 function askForKey(detail) {
   const input = h("input", { id: "key", type: "password", autocomplete: "off", required: true, spellcheck: "false" });
-  const form = h(
-    "form",
-    { method: "dialog" },
-    h("h2", { id: "key-title" }, "This service asks for a key"),
-    h("p", detail || ABOUT),
-    h("pre", h("code", "clutchlife key create --scope read")),
-    h("label", { for: "key" }, "Key"),
-    input,
-    quiet("It is kept in this tab until you close it, and sent to this service only."),
-    h("div.row.buttons", h("button.main", "Use this key")),
-  );
-  const dialog = h("dialog", { "aria-labelledby": "key-title" }, form);
-  dialog.addEventListener("cancel", (event) => event.preventDefault());
-  return answered(dialog, () => key.set(input.value.trim()));
+  const kept = quiet("It is kept in this tab until you close it, and sent to this service only.");
+  return asked({
+    title: "This service asks for a key",
+    lines: [h("p", detail || ABOUT), h("pre", h("code", "clutchlife key create --scope read"))],
+    fields: field(input, "Key", kept),
+    action: "Use this key",
+    leave: null,
+    send: () => key.set(input.value.trim()),
+  });
 }
