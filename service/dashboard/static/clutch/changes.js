@@ -6,7 +6,7 @@ import { doubtList } from "../sending/receipt.js";
 import { clutchPath, Problem, readAll, sendJson } from "../shared/api.js";
 import { asked } from "../shared/dialog.js";
 import { button, field, h } from "../shared/dom.js";
-import { fixed, kindName } from "../shared/format.js";
+import { fixed, kindName, words } from "../shared/format.js";
 import { problemView } from "../shared/problem_view.js";
 
 /** @typedef {"confirm" | "correct" | "reread" | "withdraw" | "restore"} RunAction */
@@ -88,8 +88,20 @@ async function confirm(run, reason) {
 }
 
 const TURNS = /** @type {const} */ ({
-  withdraw: { past: "withdrawn", noun: "withdrawal", back: "restore" },
-  restore: { past: "restored", noun: "restoration", back: "withdraw" },
+  withdraw: {
+    past: "withdrawn",
+    noun: "withdrawal",
+    back: "restore",
+    run: "The run no longer counts, and all results are recomputed without it. Nothing is deleted: you can restore the run.",
+    inspection: "It disappears from the charts and stays in the table. Nothing is deleted: you can restore it.",
+  },
+  restore: {
+    past: "restored",
+    noun: "restoration",
+    back: "withdraw",
+    run: "The run returns to the state before its withdrawal, and all results are recomputed.",
+    inspection: "It appears in the charts again, with its photographs.",
+  },
 });
 
 /** @type {(action: keyof typeof TURNS, address: string, name: string, reason: string) => Promise<Done>} */
@@ -99,6 +111,14 @@ async function turn(action, address, name, reason) {
   const text = `${name} is ${past}.${held(after)}`;
   return { text, undo: () => turn(back, address, name, `the ${noun} is undone`) };
 }
+
+/** @type {(action: keyof typeof TURNS, kind: "run" | "inspection", address: string, name: string) => Question} */
+const turning = (action, kind, address, name) => ({
+  title: `${words(action)} this ${kind}`,
+  lines: [TURNS[action][kind]],
+  action: words(action),
+  send: (reason) => turn(action, address, name, reason),
+});
 
 /** @type {(action: keyof typeof TURNS, run: Receipt, reason: string) => Promise<Done>} */
 const turnRun = (action, run, reason) => turn(action, pathOf(run), named(run), reason);
@@ -185,20 +205,8 @@ const QUESTIONS = {
     send: (reason, cycles) => correct(run, cycles, reason),
   }),
   reread: rereading,
-  withdraw: (run) => ({
-    title: "Withdraw this run",
-    lines: [
-      "The run no longer counts, and all results are recomputed without it. Nothing is deleted: you can restore the run.",
-    ],
-    action: "Withdraw",
-    send: (reason) => turnRun("withdraw", run, reason),
-  }),
-  restore: (run) => ({
-    title: "Restore this run",
-    lines: ["The run returns to the state before its withdrawal, and all results are recomputed."],
-    action: "Restore",
-    send: (reason) => turnRun("restore", run, reason),
-  }),
+  withdraw: (run) => turning("withdraw", "run", pathOf(run), named(run)),
+  restore: (run) => turning("restore", "run", pathOf(run), named(run)),
 };
 
 /**
@@ -225,20 +233,10 @@ export const askUndo = (run) =>
 /** @type {(inspection: InspectionOut) => Asked} withdraw an inspection, or restore it where it was withdrawn */
 export function askInspection({ clutch_id: clutch, inspection_id: id, cycles, state }) {
   const action = state === "withdrawn" ? "restore" : "withdraw";
-  const place = `at ${fixed(cycles)} cycles`;
+  const name = `inspection at ${fixed(cycles)} cycles`;
   const address = `${clutchPath(clutch)}/inspections/${id}`;
-  const word = action === "withdraw" ? "Withdraw" : "Restore";
-  return ask({
-    title: `${word} this inspection`,
-    lines: [
-      h("p", h("b", `Inspection ${place}`)),
-      action === "withdraw"
-        ? "It disappears from the charts and stays in the table. Nothing is deleted: you can restore it."
-        : "It appears in the charts again, with its photographs.",
-    ],
-    action: word,
-    send: (reason) => turn(action, address, `The inspection ${place}`, reason),
-  });
+  const question = turning(action, "inspection", address, `The ${name}`);
+  return ask({ ...question, lines: [h("p", h("b", words(name))), ...question.lines] });
 }
 
 /** @type {(id: string, archived: boolean) => Asked} archive a clutch, or bring it back; `archived`: what it becomes */
