@@ -11,73 +11,45 @@ const DIGITS = [
   [0.001, 0.0099, 3],
   [0.0001, 0.00099, 4],
   [null, 0.000099, 6],
-].map(([from, to, decimals]) => ({ dtickrange: [from, to], value: `,.${decimals}f` }));
+].map(([from, to, decimals]) => ({ name: `${decimals}`, dtickrange: [from, to], value: `,.${decimals}f` }));
 
 /**
- * A chart's own layout on top of what all charts share.
+ * A chart's own layout on top of what all charts share; what all axes share is the plotting library's template.
  * @type {(c: Colours, layout: Layout, options: { height: number, compact: boolean }) => WholeLayout}
  */
 export function base(c, layout, { height, compact }) {
-  const common = commonOf(c, height, compact);
-  if (layout.scene) {
-    const margin = { l: 0, r: 0, t: 0, b: 0 };
-    return {
-      ...common,
-      ...layout,
-      legend: common.legend,
-      margin,
-      dragmode: "turntable",
-      scene: scene(c, layout.scene, compact),
-    };
-  }
-  const axis = axisOf(c, compact);
-  const named = Object.keys(layout).filter((key) => /^[xy]axis/.test(key));
-  const axes = [...new Set(["xaxis", "yaxis", ...named])].map((name) => [
-    name,
-    merged(axis, /** @type {Axis | undefined} */ (layout[name])),
-  ]);
-  return {
-    ...common,
-    ...layout,
-    ...Object.fromEntries(axes),
-    legend: { ...common.legend, ...layout.legend },
-    margin: { ...common.margin, ...layout.margin },
-  };
-}
-
-/** @type {(c: Colours, compact: boolean) => Axis} */
-function axisOf(c, compact) {
-  return {
-    gridcolor: c.line,
+  const size = compact ? 11 : 12.5;
+  const title = { standoff: 8, font: { size } };
+  const axis = { gridcolor: c.line, zeroline: false, exponentformat: "none", tickformatstops: DIGITS, title };
+  const flat = {
+    ...axis,
+    showline: true,
     linecolor: c.edge,
-    zeroline: false,
     ticks: "outside",
     tickcolor: c.edge,
     ticklen: 4,
     automargin: true,
-    title: { standoff: 8, font: { size: compact ? 11 : 12.5 } },
-    exponentformat: "none",
-    tickformatstops: DIGITS,
   };
-}
-
-/**
- * @param {Colours} c
- * @param {number} height
- * @param {boolean} compact
- */
-function commonOf(c, height, compact) {
+  const deep = { ...axis, color: c.ink, showbackground: false, tickfont: { size: compact ? 9 : 11 } };
+  const view = {
+    aspectmode: "manual",
+    aspectratio: { x: 1.35, y: 1.1, z: 0.8 },
+    camera: {
+      eye: compact ? { x: 1.9, y: -2.1, z: 0.95 } : { x: 1.5, y: -1.6, z: 0.75 },
+      center: { x: 0, y: 0, z: -0.12 },
+    },
+  };
+  const flatMargin = { l: 56, r: 16, t: 12, b: 48, ...layout.margin };
   return {
     height,
     autosize: true,
     paper_bgcolor: c.panel,
     plot_bgcolor: c.panel,
-    font: { family: FONT, size: compact ? 11 : 12.5, color: c.ink },
-    margin: { l: 56, r: 16, t: 12, b: 48 },
+    font: { family: FONT, size, color: c.ink },
     hoverlabel: { bgcolor: c.panel, bordercolor: c.edge, font: { color: c.ink, family: FONT, size: 12.5 } },
     hovermode: "closest",
     separators: ".,",
-    dragmode: COARSE.matches ? false : "zoom",
+    dragmode: layout.scene ? "turntable" : COARSE.matches ? false : "zoom",
     legend: {
       orientation: "h",
       y: -62 / Math.max(80, height - 110),
@@ -87,42 +59,12 @@ function commonOf(c, height, compact) {
       font: { size: compact ? 11 : 12 },
       bgcolor: "rgba(0,0,0,0)",
     },
+    ...layout,
+    ...(layout.scene && { scene: { ...view, ...layout.scene } }),
+    margin: layout.scene ? { l: 0, r: 0, t: 0, b: 0 } : flatMargin,
+    template: { layout: { xaxis: flat, yaxis: flat, scene: { xaxis: deep, yaxis: deep, zaxis: deep } } },
   };
 }
-
-/**
- * @param {Colours} c
- * @param {NonNullable<Layout["scene"]>} own
- * @param {boolean} compact
- */
-function scene(c, own, compact) {
-  const axis = {
-    gridcolor: c.line,
-    color: c.ink,
-    backgroundcolor: c.panel,
-    showbackground: false,
-    zeroline: false,
-    exponentformat: "none",
-    tickformatstops: DIGITS,
-    tickfont: { size: compact ? 9 : 11 },
-    title: { font: { size: compact ? 11 : 12.5 } },
-  };
-  return {
-    aspectmode: "manual",
-    aspectratio: { x: 1.35, y: 1.1, z: 0.8 },
-    camera: {
-      eye: compact ? { x: 1.9, y: -2.1, z: 0.95 } : { x: 1.5, y: -1.6, z: 0.75 },
-      center: { x: 0, y: 0, z: -0.12 },
-    },
-    ...own,
-    xaxis: merged(axis, own.xaxis),
-    yaxis: merged(axis, own.yaxis),
-    zaxis: merged(axis, own.zaxis),
-  };
-}
-
-/** @type {(ours: Axis, own?: Axis) => Axis} */
-const merged = (ours, own = {}) => ({ ...ours, ...own, title: { ...ours.title, ...own.title } });
 
 /**
  * What the plotting library may do: no logo, no tool bar, and nothing that leaves this host.

@@ -31,31 +31,25 @@ export function colours(scheme = null) {
     return [name, computed.color];
   });
   probe.remove();
-  /** @type {Record<(typeof NAMES)[number], string>} */
-  const named = Object.fromEntries(entries);
-  return {
-    ...named,
-    ramp: (share) => between([named.fresh, named.midlife, named.worn], share),
-    pressureRamp: (share) => between([named.low, named.high], share),
-  };
+  return /** @type {Colours} */ (Object.fromEntries(entries));
 }
 
 /** @type {(rgb: string) => number[]} red, green and blue of a computed colour */
 const channels = (rgb) => (rgb.match(/[\d.]+/g) ?? []).slice(0, 3).map(Number);
 
-/** @type {(stops: string[], share: number) => string} a colour between several, share from 0 to 1 */
-function between(stops, share) {
-  const place = Math.min(1, Math.max(0, share)) * (stops.length - 1);
+/** @type {(stops: string[], nth: number, count: number) => string} from the first colour to the last */
+function between(stops, nth, count) {
+  const place = (count > 1 ? nth / (count - 1) : 0) * (stops.length - 1);
   const index = Math.min(stops.length - 2, Math.floor(place));
   const [from, to] = [channels(stops[index]), channels(stops[index + 1])];
   return `rgb(${from.map((value, channel) => Math.round(value + (to[channel] - value) * (place - index))).join(", ")})`;
 }
 
 /** @type {(c: Colours, index: number, count: number) => string} of the n-th of several, from fresh to worn */
-export const rampOf = (c, index, count) => c.ramp(count > 1 ? index / (count - 1) : 0);
+export const rampOf = (c, index, count) => between([c.fresh, c.midlife, c.worn], index, count);
 
 /** @type {(c: Colours, index: number, count: number) => string} from the lowest pressure to the highest */
-export const pressureRampOf = (c, index, count) => c.pressureRamp(count > 1 ? index / (count - 1) : 0);
+export const pressureRampOf = (c, index, count) => between([c.low, c.high], index, count);
 
 /** @type {(rgb: string, opacity: number) => string} the colour, partly transparent */
 export const faint = (rgb, opacity) => `rgba(${channels(rgb).join(", ")}, ${opacity})`;

@@ -63,7 +63,7 @@ export function sketch({ data, layout, ticks, legend }, { width, height }, own =
       data.map((trace, index) => drawn(trace, data[index - 1], x, y)),
     ),
     (layout.shapes ?? []).map((shape) => ruled(shape, frame)),
-    svg("path", { d: axes, fill: "none", stroke: layout.xaxis.linecolor }),
+    svg("path", { d: axes, fill: "none", stroke: layout.template.layout.xaxis.linecolor }),
     (layout.annotations ?? []).map((annotation) => noted(annotation, frame)),
     label(layout.xaxis.title?.text ?? "", { ...titles.x, "text-anchor": "middle" }),
     label(layout.yaxis.title?.text ?? "", { ...titles.y, "text-anchor": "middle" }),
@@ -80,11 +80,11 @@ function grid({ layout, ticks }, { x, y, l, t, inside }) {
     svg("line", { x1: px(from), x2: px(to), y1: px(u), y2: px(v), stroke: colour });
   return [
     ...ticks.x.flatMap(({ at, text }) => [
-      line(l + x(at), l + x(at), t, bottom + 4, layout.xaxis.gridcolor),
+      line(l + x(at), l + x(at), t, bottom + 4, layout.template.layout.xaxis.gridcolor),
       label(text, { x: l + x(at), y: bottom + 7 + size, "text-anchor": "middle" }),
     ]),
     ...ticks.y.flatMap(({ at, text }) => [
-      line(l - 4, l + inside.width, t + y(at), t + y(at), layout.yaxis.gridcolor),
+      line(l - 4, l + inside.width, t + y(at), t + y(at), layout.template.layout.yaxis.gridcolor),
       label(text, { x: l - 7, y: t + y(at) + 0.35 * size, "text-anchor": "end" }),
     ]),
   ];

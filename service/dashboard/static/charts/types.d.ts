@@ -15,9 +15,8 @@ type Spec =
   | { empty: string; note?: undefined; columns?: undefined; rows?: undefined; figure?: undefined }
   | { empty?: undefined; note: string; columns: Column[]; rows: Cell[][]; figure: (colours: Colours) => Figure };
 
-/** Colours as CSS; `ramp` gives one between fresh (0) and worn (1), `pressureRamp` between the lowest and the highest pressure. */
-type Colours = Record<(typeof import("./palette.js").NAMES)[number], string> &
-  Record<"ramp" | "pressureRamp", (share: number) => string>;
+/** Colours as CSS. */
+type Colours = Record<(typeof import("./palette.js").NAMES)[number], string>;
 type Scheme = "light" | "dark" | null;
 
 interface Figure {
@@ -77,8 +76,6 @@ interface Axis {
   title?: { text?: string; standoff?: number; font?: { size: number } };
   range?: Span;
   rangemode?: "tozero";
-  gridcolor?: string;
-  linecolor?: string;
   [name: string]: unknown;
 }
 
@@ -115,7 +112,6 @@ interface Layout {
   shapes?: Shape[];
   annotations?: Annotation[];
   margin?: Partial<WholeLayout["margin"]>;
-  legend?: object;
   [name: string]: unknown;
 }
 
@@ -125,6 +121,7 @@ interface WholeLayout extends Layout {
   margin: Record<"l" | "r" | "t" | "b", number>;
   legend: { font: { size: number }; [name: string]: unknown };
   paper_bgcolor: string;
+  template: { layout: Record<"xaxis" | "yaxis", { gridcolor: string; linecolor: string }> & { scene: object } };
 }
 
 interface WholeFigure {
