@@ -12,11 +12,9 @@ import gzip
 import hashlib
 import posixpath
 import re
-from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
-from importlib.metadata import version
-from importlib.util import find_spec
+from importlib.metadata import distribution, version
 from pathlib import Path
 
 STATIC = Path(__file__).parent / "static"
@@ -48,17 +46,6 @@ class Asset:
     def compressed(self) -> bytes:
         """Gzipped, computed when it is first requested."""
         return gzip.compress(self.body, 9, mtime=0)
-
-
-def plotting_library() -> Path:
-    """Where the wheel of plotly keeps its JavaScript; raises FileNotFoundError where it is not installed."""
-    spec = find_spec("plotly")  # of a top-level package: locates it, does not run it
-    folders = [] if spec is None else spec.submodule_search_locations or []
-    for folder in folders:
-        path = Path(folder) / "package_data" / "plotly.min.js"
-        if path.is_file():
-            return path
-    raise FileNotFoundError("plotly.min.js is missing: the package plotly is not installed completely")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -102,15 +89,12 @@ def load(folder: Path = STATIC) -> Assets:
     """Read every file of the tree, and the plotting library."""
     paths = sorted(path for path in folder.rglob("*") if path.suffix in TYPES and path.is_file())
     assets = [read(path, path.relative_to(folder).as_posix()) for path in paths]
-    library = plotting_library()
+    library = Path(str(distribution("plotly").locate_file("plotly/package_data/plotly.min.js")))
     assets.append(read(library, library.name))
-    return Assets(by_name={asset.name: asset for asset in assets}, digest=_digest(assets))
+    listing = "".join(f"{asset.name} {asset.digest}\n" for asset in assets)
+    digest = hashlib.sha256(listing.encode()).hexdigest()[:16]
+    return Assets(by_name={asset.name: asset for asset in assets}, digest=digest)
 
 
 def read(path: Path, name: str) -> Asset:
     return Asset(name=name, media_type=TYPES[path.suffix], body=path.read_bytes())
-
-
-def _digest(assets: Iterable[Asset]) -> str:
-    listing = "".join(f"{asset.name} {asset.digest}\n" for asset in assets)
-    return hashlib.sha256(listing.encode()).hexdigest()[:16]

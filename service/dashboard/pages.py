@@ -1,5 +1,7 @@
 """The dashboard's pages and what they load. They hold no data: that comes from the API, with the reader's key."""
 
+from functools import partial
+
 from fastapi import APIRouter, Request
 from fastapi.responses import Response
 from starlette.exceptions import HTTPException
@@ -13,38 +15,26 @@ REVALIDATE = "no-cache"
 def router(assets: Assets) -> APIRouter:
     """`/`, `/compare`, `/clutches/{clutch_id}` and `/assets/...`."""
     pages = {
-        name: assets.page(name, root)
-        for name, root in (("fleet.html", "./"), ("compare.html", "./"), ("clutch.html", "../"))
+        "/": ("fleet.html", "./"),
+        "/compare": ("compare.html", "./"),
+        "/clutches/{clutch_id}": ("clutch.html", "../"),
     }
     routes = APIRouter(include_in_schema=False)
-
-    @routes.get("/")
-    def fleet(request: Request) -> Response:
-        """Every clutch, worst first."""
-        return answer(request, pages["fleet.html"], REVALIDATE)
-
-    @routes.get("/compare")
-    def compare(request: Request) -> Response:
-        """Clutches, lives and states over one another."""
-        return answer(request, pages["compare.html"], REVALIDATE)
-
-    @routes.get("/clutches/{clutch_id}")
-    def clutch(request: Request, clutch_id: str) -> Response:  # noqa: ARG001  (the page reads its own address)
-        """One clutch."""
-        return answer(request, pages["clutch.html"], REVALIDATE)
+    for path, (name, root) in pages.items():  # a page reads its own address
+        routes.add_api_route(path, partial(answer, assets.page(name, root), REVALIDATE))
 
     @routes.get("/assets/{digest}/{name:path}")
     def asset(request: Request, digest: str, name: str) -> Response:
         """A file that a page loads, by its path in the tree; one of another version must not be kept."""
         served = assets.by_name.get(name)
-        if served is None or name in pages:
+        if served is None or name.endswith(".html"):
             raise HTTPException(404, f"no such file: {name[:80]}")
-        return answer(request, served, _IMMUTABLE if digest == assets.digest else "no-store")
+        return answer(served, _IMMUTABLE if digest == assets.digest else "no-store", request)
 
     return routes
 
 
-def answer(request: Request, asset: Asset, caching: str) -> Response:
+def answer(asset: Asset, caching: str, request: Request) -> Response:
     """A file, gzipped where the browser takes that; 304 where it has it already."""
     zipped = "gzip" in request.headers.get("accept-encoding", "")
     tag = f'"{asset.digest}{"-gz" if zipped else ""}"'

@@ -39,6 +39,6 @@ def router(folder: Path = SITE) -> APIRouter:
             raise HTTPException(404, f"no such page: {name[:80]}")
         if name not in kept:
             kept[name] = read(paths[name], name)
-        return answer(request, kept[name], REVALIDATE)
+        return answer(kept[name], REVALIDATE, request)
 
     return routes
