@@ -15,28 +15,22 @@ const PACE = "pace_cycles_per_hour";
 /** What is shown of the answer's quantiles. */
 const SHOWN = ["0.05", "0.5", "0.95"];
 
-/** @typedef {{ input: HTMLInputElement, note: HTMLElement }} Entry what is typed, and below it what is wrong with it */
-/** @typedef {Record<"element" | "legend" | "remove" | "note", HTMLElement> & { entries: Entry[] }} Block */
-
 /** Numbers the fields: labels need names of their own. */
 let count = 0;
 
-/** @type {(name: string, label: string, value?: string) => Entry & { element: HTMLElement }} a number of the form */
+/** @type {(name: string, label: string, value?: string) => HTMLElement} a number of the form, below it what is wrong with it */
 function entry(name, label, value = "") {
   const id = `planned-${(count += 1)}`;
-  const input = h("input", { id, name, value, inputmode: "decimal", autocomplete: "off" });
-  const note = wrongNote();
-  return { input, note, element: field(input, label, note) };
+  const attributes = { inputmode: "decimal", autocomplete: "off", "aria-describedby": `${id}-wrong` };
+  return field(h("input", { id, name, value, ...attributes }), label, h("p.wrong", { id: `${id}-wrong` }));
 }
-
-const wrongNote = () => h("p.wrong", { id: `planned-${(count += 1)}`, hidden: true });
 
 /** @type {(place: HTMLElement, clutchId: string) => void} */
 export function plannedDuty(place, clutchId) {
   const address = `${clutchPath(clutchId)}/remaining-useful-life/forecast`;
   /** @type {string | undefined} what a planned cycle counts by; undefined: as the service assumes */
   let countedBy;
-  /** @type {Block[]} */
+  /** @type {{ element: HTMLElement, legend: HTMLElement, remove: HTMLElement }[]} */
   let blocks = [];
   const pace = entry(PACE, "Pace, duty cycles per hour (idle hours included)");
   const all = h("div.blocks");
@@ -52,28 +46,27 @@ export function plannedDuty(place, clutchId) {
     countedBy = undefined;
     ask();
   };
-  const form = h("form", { novalidate: true, onsubmit }, all, h("div.fields", pace.element), buttons, answer);
+  const form = h("form", { novalidate: true, onsubmit }, all, h("div.fields", pace), buttons, answer);
   const about = "The blocks run one after the other and repeat until the end of life. Fields may stay empty.";
   place.append(h("details.planned", h("summary", "Planned duty"), quiet(about), form));
   append();
 
-  const focusLast = () => blocks.at(-1)?.entries[0].input.focus();
+  const focusLast = () => blocks.at(-1)?.element.querySelector("input")?.focus();
 
   function append() {
+    const legend = h("legend");
     const entries = OF_BLOCK.map((each) => entry(...each));
-    const fields = h("div.fields", ...entries.map(({ element }) => element));
-    const [legend, note] = [h("legend"), wrongNote()];
-    const remove = button("Remove", () => drop(block), { class: "remove" });
-    const block = { element: h("fieldset", legend, fields, note, remove), legend, remove, note, entries };
-    all.append(block.element);
-    blocks.push(block);
+    const remove = button("Remove", () => drop(element), { class: "remove" });
+    const element = h("fieldset", legend, h("div.fields", entries), remove);
+    all.append(element);
+    blocks.push({ element, legend, remove });
     renumber();
   }
 
-  /** @param {Block} block */
+  /** @param {HTMLElement} block */
   function drop(block) {
-    block.element.remove();
-    blocks = blocks.filter((other) => other !== block);
+    block.remove();
+    blocks = blocks.filter(({ element }) => element !== block);
     renumber();
     focusLast();
   }
@@ -86,41 +79,29 @@ export function plannedDuty(place, clutchId) {
     }
   }
 
-  /** Every number by the place that an error of the service names; a block's own error is marked at its first number. */
-  function places() {
-    /** @type {[string, Entry][]} */
-    const numbers = blocks.flatMap(({ entries, note }, place) => [
-      [`/programme/${place}`, { input: entries[0].input, note }],
-      ...entries.map((each) => /** @type {[string, Entry]} */ ([`/programme/${place}/${each.input.name}`, each])),
-    ]);
-    return new Map([...numbers, [`/${PACE}`, pace]]);
+  /** @type {(pointer: string) => HTMLInputElement | undefined} the number that an error is about; of a whole block its first */
+  function numberAt(pointer) {
+    const [, part, place, name] = pointer.split("/");
+    const within = part === PACE ? pace : blocks[Number(place)]?.element;
+    return within && inputsOf(within).find((input) => name === undefined || input.name === name);
   }
 
   async function ask() {
-    const known = places();
-    for (const { input, note } of known.values()) {
-      input.removeAttribute("aria-invalid");
-      input.removeAttribute("aria-describedby");
-      note.replaceChildren();
-      note.hidden = true;
-    }
-    const numbers = [...blocks.flatMap(({ entries }) => entries), pace];
-    const unread = numbers.filter(({ input }) => numberOf(input.value) === undefined);
-    for (const each of unread) mark(each, NOT_A_NUMBER);
-    if (unread.length > 0) {
-      answer.replaceChildren();
-      return focusWrong();
-    }
+    const inputs = inputsOf(form);
+    for (const input of inputs) mark(input, "");
+    for (const input of inputs) if (numberOf(input.value) === undefined) mark(input, NOT_A_NUMBER);
+    answer.replaceChildren();
+    if (focusWrong()) return;
     go.disabled = true;
     answer.replaceChildren(quiet("Computing …"));
     try {
-      const programme = blocks.map(({ entries }) => numbersIn(entries));
+      const programme = blocks.map(({ element }) => numbersIn(element));
       /** @type {{ body: PlannedLife }} */
-      const { body } = await sendJson("POST", address, { programme, ...numbersIn([pace]), counted_by: countedBy });
+      const { body } = await sendJson("POST", address, { programme, ...numbersIn(pace), counted_by: countedBy });
       answer.replaceChildren(...shown(body), other(body));
     } catch (problem) {
       if (!(problem instanceof Problem)) throw problem;
-      const elsewhere = problem.errors.filter(({ pointer, message }) => !mark(known.get(pointer), message));
+      const elsewhere = problem.errors.filter(({ pointer, message }) => !mark(numberAt(pointer), message));
       const marked = problem.errors.length > 0 && elsewhere.length === 0;
       const see = h("p.notice.bad", { role: "alert" }, "The plan is incomplete: see the marked fields.");
       answer.replaceChildren(marked ? see : problemView(problem, "No prediction. "));
@@ -130,9 +111,11 @@ export function plannedDuty(place, clutchId) {
     }
   }
 
+  /** Whether a number is wrong: the first that is has the focus then. */
   function focusWrong() {
-    const first = form.querySelector("[aria-invalid]");
-    if (first instanceof HTMLElement) first.focus();
+    const first = inputsOf(form).find((input) => input.hasAttribute("aria-invalid"));
+    first?.focus();
+    return first !== undefined;
   }
 
   /** @type {(life: PlannedLife) => HTMLElement | string} the other way to count, where the service assumed one */
@@ -148,21 +131,22 @@ export function plannedDuty(place, clutchId) {
   }
 }
 
-/** @type {(entry: Entry | undefined, message: string) => boolean} an error at what it is about; whether that is known */
-function mark(entry, message) {
-  if (entry === undefined) return false;
-  const { input, note } = entry;
-  note.replaceChildren(message.replace(/^programme\S*: /, "")); // the field says where it is
-  note.hidden = false;
-  input.setAttribute("aria-invalid", "true");
-  input.setAttribute("aria-describedby", note.id);
+/** @param {HTMLElement} place */
+const inputsOf = (place) => [...place.querySelectorAll("input")];
+
+/** @type {(input: HTMLInputElement | undefined, message: string) => boolean} what is wrong with a number, "": nothing; whether it is known */
+function mark(input, message) {
+  if (!input?.nextElementSibling) return false;
+  input.nextElementSibling.textContent = message.replace(/^programme\S*: /, ""); // the field says where it is
+  if (message) input.setAttribute("aria-invalid", "true");
+  else input.removeAttribute("aria-invalid");
   return true;
 }
 
-/** @param {Entry[]} entries */
-function numbersIn(entries) {
-  const filled = entries.filter(({ input }) => input.value.trim() !== "");
-  return Object.fromEntries(filled.map(({ input }) => [input.name, numberOf(input.value)]));
+/** @param {HTMLElement} place */
+function numbersIn(place) {
+  const filled = inputsOf(place).filter(({ value }) => value.trim() !== "");
+  return Object.fromEntries(filled.map(({ name, value }) => [name, numberOf(value)]));
 }
 
 /** @param {PlannedLife} life */
