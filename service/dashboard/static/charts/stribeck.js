@@ -78,12 +78,13 @@ export function flat(answers) {
   const drawn = drawnOf(answers, chosen, (level) => !byState || level === pressure);
   if (drawn.length === 0) return { empty: "No stationary Stribeck test yet at this pressure." };
   const place = byState
-    ? `At ${pressureText(pressure)}, from the first test to the last. Points: measured. Lines: fitted.${leftOut(tests, drawn.length)}`
-    : `After ${fixed(drawn[0].cycles)} cycles, at every pressure. Points: measured. Lines: fitted.`;
+    ? `At ${pressureText(pressure)}, from the first test to the last.`
+    : `After ${fixed(drawn[0].cycles)} cycles, at every pressure.`;
+  const few = `${drawn.length} of ${tests.length} tests are drawn; choose “Colour by pressure” to see any of them.`;
   /** @param {Drawn} curve */
   const label = (curve) => (byState ? `${fixed(curve.cycles)} cycles` : pressureText(curve.pressure));
   return {
-    note: place,
+    note: `${place} Points: measured. Lines: fitted.${byState && drawn.length < tests.length ? ` ${few}` : ""}`,
     columns: columnsOf(),
     rows: rowsOf(drawn),
     figure: planar({ ...titled("sliding speed, rpm"), rangemode: "tozero" }, named(units().torque), [], (c) =>
@@ -99,12 +100,6 @@ export function curvesOfRun(run, channels, clutch) {
   const tests = [{ ...run, pressure_laws: null }];
   return flat({ tests, by: "pressure", run: run.run_id, channels: { [run.run_id]: channels }, clutch });
 }
-
-/** @type {(tests: StribeckItem[], drawn: number) => string} that more tests are there than are drawn */
-const leftOut = (tests, drawn) =>
-  drawn < tests.length
-    ? ` ${drawn} of ${tests.length} tests are drawn; choose “Colour by pressure” to see any of them.`
-    : "";
 
 /** @type {(curve: Drawn, name: string, color: string, c: Colours) => PlainTrace[]} */
 function flatTraces({ measured, fitted }, name, color, c) {
@@ -130,7 +125,7 @@ export function surface(answers) {
   const byPressure = over !== "cycles";
   const picked = {
     pressure: tests.filter((test) => test.run_id === run),
-    states: fewOf(tests),
+    states: spread(spread(tests), 4), // of those read for the curves as many as surfaces can be distinguished
     cycles: spread(tests, 9),
   };
   const drawn = drawnOf(answers, picked[over], (level) => byPressure || level === pressure);
@@ -153,12 +148,6 @@ export function surface(answers) {
     ),
   };
 }
-
-/**
- * As many states as surfaces can be distinguished: of those whose records are read for the curves.
- * @param {StribeckItem[]} tests
- */
-const fewOf = (tests) => spread(spread(tests), 4);
 
 /** @type {(drawn: Drawn[], cycles: number, color: string) => Trace} points would hide one another */
 function stateSurface(drawn, cycles, color) {

@@ -7,20 +7,15 @@ import { meanRadius, units } from "../shared/units.js";
 const GAMMA = 0.3;
 
 /**
- * Eq. 3: M_s (1 + (M̄_c − 1) exp(−V_S/v)) + C_v v^0.3, Nm at v ≥ 0 m/s.
- * @type {(v: number, parameters: StribeckParameters) => number}
+ * Eq. 3: M_s (1 + (M̄_c − 1) exp(−V_S/v)) + C_v v^0.3, Nm at v ≥ 0 m/s; `speed` in rpm.
+ * @type {(speed: number, fit: Fit, clutch: Pick<ClutchOut, "geometry">) => number}
  */
-function torqueAt(v, parameters) {
+export function torqueAtSpeed(speed, { parameters }, clutch) {
   const { static_torque_nm: mS, coulomb_ratio: mC, stribeck_velocity_m_s: vS, viscous_coefficient: cV } = parameters;
+  const v = speed * ((meanRadius(clutch) * 2 * Math.PI) / 60);
   const e = v > 0 ? Math.exp(-vS / v) : 0;
   return mS * (1 + (mC - 1) * e) + cV * v ** GAMMA;
 }
-
-/** @param {Pick<ClutchOut, "geometry">} clutch */
-const metresPerSecond = (clutch) => (meanRadius(clutch) * 2 * Math.PI) / 60;
-
-/** @type {(speed: number, fit: Fit, clutch: Pick<ClutchOut, "geometry">) => number} Nm, `speed` in rpm */
-export const torqueAtSpeed = (speed, fit, clutch) => torqueAt(speed * metresPerSecond(clutch), fit.parameters);
 
 /**
  * The fitted curve of one pressure between two speeds, rpm; closer points near rest, where it is curved most.

@@ -26,6 +26,9 @@ export function makeReport(place, { clutch, life, tests = [], events = [], chart
   const kind = `Wet clutch, ${clutch.friction_material} on ${clutch.reaction_plate}, ${clutch.fluid}${simulated}`;
   const values = life ? facts(clutch, life).flatMap(([name, value]) => [h("dt", name), h("dd", value)]) : [];
   const last = tests.slice(-LAST_TESTS);
+  const done = events.slice(-LAST_EVENTS).map(({ event, note, cycles: at }) => {
+    return `${words(event)}${note ? ` (${note.slice(0, 80)})` : ""} at ${fixed(at)} cycles`;
+  });
   place.replaceChildren(
     h(
       "header",
@@ -38,7 +41,7 @@ export function makeReport(place, { clutch, life, tests = [], events = [], chart
     ...drawings.flatMap((src) => (src === null ? [] : [h("img", { src, alt: "" })])),
     h("p", h("b", "Diagnosis: "), diagnosisText(clutch.diagnosis)),
     last.length > 0 ? table("The last tests", COLUMNS, last.map(testRow), { shown: true }) : "",
-    events.length > 0 ? h("p", h("b", "Events: "), events.slice(-LAST_EVENTS).map(eventText).join("; ")) : "",
+    done.length > 0 ? h("p", h("b", "Events: "), done.join("; ")) : "",
     h("p.basis", h("b", "Made of: "), basis(clutch, life, tests)),
   );
 }
@@ -57,11 +60,6 @@ function basis(clutch, life, tests) {
   ]
     .filter(Boolean)
     .join("; ");
-}
-
-/** @param {Receipt} event */
-function eventText({ event, note, cycles: at }) {
-  return `${words(event)}${note ? ` (${note.slice(0, 80)})` : ""} at ${fixed(at)} cycles`;
 }
 
 /** @param {ClutchOut["diagnosis"]} latest */

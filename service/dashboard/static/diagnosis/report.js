@@ -1,7 +1,7 @@
 // A finished report in words and tables; remaining life before and after on one scale.
 
 import { clutchPath } from "../shared/api.js";
-import { h, quiet, scrolling, svg, table } from "../shared/dom.js";
+import { h, quiet, scrolling, table } from "../shared/dom.js";
 import { files } from "../shared/files.js";
 import {
   cycles,
@@ -16,7 +16,7 @@ import {
   words,
 } from "../shared/format.js";
 import { VERDICTS } from "../shared/state.js";
-import { intervalBar } from "../shared/sparkline.js";
+import { intervalBar, shareBar } from "../shared/sparkline.js";
 
 /** @import { Content } from "../shared/dom.js" */
 
@@ -97,12 +97,12 @@ const part = (title, ...content) => h("div.part", h("h3", title), ...content);
 /** @param {DiagnosisOut} diagnosis */
 function candidates({ candidates: all = [], causes = [] }) {
   if (all.length === 0) return null;
-  const rows = all.slice(0, MOST_ROWS).map((candidate) => {
-    const { effect, title } = candidate;
+  const rows = all.slice(0, MOST_ROWS).map(({ effect, title, probability: chance, estimate }) => {
+    const name = estimate?.name ? `${words(estimate.name)} ` : "";
     return [
       h("span", { class: causes.includes(effect) ? "named" : null, title: effect }, title || words(effect)),
-      h("span.chance", chance(candidate.probability), probability(candidate.probability)),
-      estimated(candidate),
+      h("span.chance", shareBar(chance ?? 0, "likely"), probability(chance)),
+      estimate ? `${name}${withSd(estimate.value, estimate.sd)} ${estimate.unit.replace(/^[-1]$/, "")}` : "–",
     ];
   });
   const columns = ["Cause", "Probability", "Estimate"];
@@ -117,25 +117,6 @@ function evidence(value) {
   if (value === null) return "–";
   const word = value < 0 ? "none" : value < 1 ? "weak" : value < 3 ? "moderate" : "strong";
   return h("span", { title: `log evidence ${fixed(value, 1)}` }, word);
-}
-
-/** @param {CandidateOut} candidate */
-function estimated({ estimate }) {
-  if (!estimate) return "–";
-  const name = estimate.name ? `${words(estimate.name)} ` : "";
-  return `${name}${withSd(estimate.value, estimate.sd)} ${estimate.unit.replace(/^[-1]$/, "")}`;
-}
-
-/** @param {number | null} value */
-function chance(value) {
-  const size = { width: 60, height: 8 };
-  const width = (60 * (value ?? 0)).toFixed(1);
-  return svg(
-    "svg",
-    { viewBox: "0 0 60 8", ...size, "aria-hidden": "true" },
-    svg("rect.axis", { ...size, rx: 3 }),
-    svg("rect.fill", { width, height: 8, rx: 3 }),
-  );
 }
 
 /** @param {DiagnosisOut} diagnosis */

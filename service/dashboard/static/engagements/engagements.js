@@ -26,17 +26,12 @@ const NO_COMPARISON = "To simulate an engagement, the present life needs a stati
 /** @param {[string, string] | string[]} named */
 const titleOf = ([title, unit]) => (unit === "" ? title : `${title}, ${unit}`);
 
-/** @type {(measured: MeasuredEngagement[], name: Indicator) => { x: number, value: number, sd: number }[]} */
-const valuesOf = (measured, name) =>
-  measured.flatMap(({ cycles, indicators }) => {
-    const estimate = indicators[name];
-    return estimate === null ? [] : [{ x: cycles, value: estimate.value, sd: estimate.sd }];
-  });
-
 /** @type {(answers: { measured: MeasuredEngagement[], events: Receipt[], name: Indicator }) => Spec} */
 function indicatorOverLife({ measured, events, name }) {
   if (measured.length === 0) return { empty: NO_ENGAGEMENT };
-  const values = valuesOf(measured, name);
+  const values = measured.flatMap(({ cycles, indicators: { [name]: estimate } }) =>
+    estimate === null ? [] : [{ x: cycles, value: estimate.value, sd: estimate.sd }],
+  );
   if (values.length === 0) return { empty: NO_VALUE };
   const title = titleOf(INDICATORS[name]);
   return {

@@ -88,7 +88,7 @@ function show(counted, items, part) {
   if (!rows.element.isConnected) MAIN.replaceChildren(rows.element);
   const total = countOf(counted, only);
   rows.show(items, part, total, counted.scale_cycles);
-  drawChips(counted, only, choose);
+  drawChips(counted);
   if (total === 0)
     MAIN.append(h("p", { id: "nothing", class: "notice", role: "status" }, "No clutch matches the search."));
   byId("printed").textContent =
@@ -99,7 +99,7 @@ function show(counted, items, part) {
 /** @param {Choice} choice */
 function choose(choice) {
   only = choice;
-  if (totals !== null) drawChips(totals, only, choose);
+  if (totals !== null) drawChips(totals);
   restart();
 }
 
@@ -192,11 +192,8 @@ function countOf({ all, held, states }, only) {
   return only === null ? all : only === "held" ? held : states[only];
 }
 
-/** @param {string | undefined} name of a choice */
-const chipOf = (name) => byId("chips").querySelector(`[data-state="${name}"]`);
-
-/** @type {(totals: FleetTotals, only: Choice, choose: (chosen: Choice) => void) => void} `only`: what is shown */
-function drawChips(totals, only, choose) {
+/** @param {FleetTotals} totals */
+function drawChips(totals) {
   /** @type {(name: Choice, label: string) => HTMLElement | null} */
   const chip = (name, label) => {
     const count = countOf(totals, name);
@@ -214,6 +211,5 @@ function drawChips(totals, only, choose) {
     chip("held", "with held runs"),
   ];
   byId("chips").replaceChildren(...chips.filter((element) => element !== null));
-  const again = focused && chipOf(focused);
-  if (again instanceof HTMLElement) again.focus();
+  chips.find((element) => focused && element?.dataset.state === focused)?.focus();
 }

@@ -73,13 +73,12 @@ export function interval(quantiles) {
   return `${cycles(low, low, high)} to ${cycles(high, low, high)}`;
 }
 
-/** @type {(quantiles: Quantiles) => string} the median of remaining cycles, or that it lies beyond the horizon */
-export const aboutCycles = (quantiles) =>
-  quantiles["0.5"] === null ? "over 1,000,000" : cycles(quantiles["0.5"], quantiles["0.05"], quantiles["0.95"]);
-
 /** @type {(quantiles: Quantiles) => string} what is likely of remaining cycles: the median and the 90 % interval */
-export const likely = (quantiles) =>
-  `50 % chance of ${aboutCycles(quantiles)} or more; 90 % interval: ${interval(quantiles)}`;
+export function likely(quantiles) {
+  const { 0.05: low, 0.5: median, 0.95: high } = quantiles;
+  const about = median === null ? "over 1,000,000" : cycles(median, low, high);
+  return `50 % chance of ${about} or more; 90 % interval: ${interval(quantiles)}`;
+}
 
 /** @type {(bound: number | null) => string} the safe bound of remaining cycles, rounded down to two digits */
 export function atLeast(bound) {
