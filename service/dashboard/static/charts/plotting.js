@@ -4,17 +4,13 @@
 /** @type {Promise<Plotting> | null} */
 let loading = null;
 
-let ask = () => {};
-/**
- * When something has needed the library.
- * @type {Promise<void>}
- */
-export const wanted = new Promise((resolve) => {
-  ask = resolve;
-});
+/** @type {PromiseWithResolvers<void>} */
+const need = Promise.withResolvers();
+/** When something has needed the library. */
+export const wanted = need.promise;
 
 /** Draw by the library from now on what is drawn light: someone points at it, to zoom or to read values. */
-export const want = () => ask();
+export const want = () => need.resolve();
 
 /** Plotly, when its script has run; it is a file of this service. */
 export function plotly() {

@@ -3,7 +3,7 @@
 import { Chart, chooser, setControls } from "../charts/chart.js";
 import { landscape, parameter, PARAMETER_NAMES, PARAMETERS } from "../charts/parameters.js";
 import { flat, pressuresOf, spread, surface } from "../charts/stribeck.js";
-import { levelOptions, stateOptions, usual } from "../quantities/names.js";
+import { levelOptions, optionsOf, stateOptions, usual } from "../quantities/names.js";
 import { pressureLaw } from "../quantities/pressure_laws.js";
 import { within } from "../shared/dom.js";
 
@@ -27,8 +27,7 @@ const DEPTHS = [
 /** @typedef {{ pressure?: number, run?: string, by: "state" | "pressure", over: Depth }} OfCurves */
 /** @typedef {OfCurves & { lawRun?: string, parameter: ParameterName, law: ParameterName }} Chosen */
 
-/** @type {[ParameterName, string][]} */
-const NAMES = PARAMETER_NAMES.map((key) => [key, PARAMETERS[key].title]);
+const NAMES = optionsOf(PARAMETERS);
 
 /** @type {(page: Page) => Tab} */
 export function curvesTab({ reader }) {

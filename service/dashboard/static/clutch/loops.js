@@ -6,7 +6,7 @@ import { loopCurves, loopPressures } from "../charts/loops.js";
 import { spread } from "../charts/stribeck.js";
 import { LAG_NAMES, lagOverCycles, lagOverPressure } from "../quantities/lag.js";
 import { lazy } from "../quantities/lazy.js";
-import { levelOptions, levelsOf, QUANTITIES, stateOptions, usual } from "../quantities/names.js";
+import { levelOptions, levelsOf, optionsOf, QUANTITIES, stateOptions, usual } from "../quantities/names.js";
 import { read } from "../shared/api.js";
 import { byId, within } from "../shared/dom.js";
 import { BY } from "./curves.js";
@@ -16,8 +16,7 @@ import { BY } from "./curves.js";
 
 /** @typedef {{ over: "state" | "pressure", pressure?: number, run?: string }} OfLoops */
 
-/** @type {[LagName, string][]} */
-const QUANTITY_OPTIONS = LAG_NAMES.map((name) => [name, QUANTITIES[name].title]);
+const QUANTITY_OPTIONS = optionsOf(QUANTITIES, LAG_NAMES);
 
 /** @type {(page: Page) => Tab} */
 export function loopsTab({ reader }) {

@@ -3,7 +3,7 @@
 import { clutchPath, Problem, sendJson } from "../shared/api.js";
 import { button, field, h, quiet, scrolling, table } from "../shared/dom.js";
 import { fixed, NOT_A_NUMBER, numberOf, significant, sentence } from "../shared/format.js";
-import { problemView } from "../shared/problem_view.js";
+import { attempted } from "../shared/problem_view.js";
 
 /** @type {[name: string, label: string, value?: string][]} what is typed of a block; left empty it is not sent */
 const OF_BLOCK = [
@@ -92,22 +92,21 @@ export function plannedDuty(place, clutchId) {
     for (const input of inputs) if (numberOf(input.value) === undefined) mark(input, NOT_A_NUMBER);
     answer.replaceChildren();
     if (focusWrong()) return;
-    go.disabled = true;
-    answer.replaceChildren(quiet("Computing …"));
+    await attempted([go], answer, "Computing …", predict, "No prediction. ");
+    focusWrong();
+  }
+
+  async function predict() {
+    const programme = blocks.map(({ element }) => numbersIn(element));
     try {
-      const programme = blocks.map(({ element }) => numbersIn(element));
       /** @type {{ body: PlannedLife }} */
       const { body } = await sendJson("POST", address, { programme, ...numbersIn(pace), counted_by: countedBy });
       answer.replaceChildren(...shown(body), other(body));
     } catch (problem) {
-      if (!(problem instanceof Problem)) throw problem;
-      const elsewhere = problem.errors.filter(({ pointer, message }) => !mark(numberAt(pointer), message));
-      const marked = problem.errors.length > 0 && elsewhere.length === 0;
-      const see = h("p.notice.bad", { role: "alert" }, "The plan is incomplete: see the marked fields.");
-      answer.replaceChildren(marked ? see : problemView(problem, "No prediction. "));
-      focusWrong();
-    } finally {
-      go.disabled = false;
+      const errors = problem instanceof Problem ? problem.errors : [];
+      const elsewhere = errors.filter(({ pointer, message }) => !mark(numberAt(pointer), message));
+      if (errors.length === 0 || elsewhere.length > 0) throw problem;
+      answer.replaceChildren(h("p.notice.bad", { role: "alert" }, "The plan is incomplete: see the marked fields."));
     }
   }
 

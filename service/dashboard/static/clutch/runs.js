@@ -78,7 +78,7 @@ export function runsTab(place, { reader, done }) {
     const name = run.state === "withdrawn" ? "s" : "span";
     const summary = h(
       "summary",
-      h(name, { class: "at" }, `${fixed(run.cycles)} cycles`),
+      h(name, { class: "number" }, `${fixed(run.cycles)} cycles`),
       h(name, nameOf(run)),
       h("span", stateMark(run) || resultOf(run)),
       h("span", { class: count > 0 ? "warned" : "quiet" }, warned),

@@ -8,7 +8,7 @@ import { PARAMETER_NAMES } from "../charts/parameters.js";
 import { spread } from "../charts/stribeck.js";
 import { curveOf, xyOf } from "../charts/stribeck_law.js";
 import { planar, titled } from "../charts/traces.js";
-import { levelsOf, QUANTITIES, usual } from "../quantities/names.js";
+import { levelsOf, optionsOf, QUANTITIES, titleOf, usual } from "../quantities/names.js";
 import { clutchPath, read, readAll } from "../shared/api.js";
 import { button, byId, h } from "../shared/dom.js";
 import { fixed } from "../shared/format.js";
@@ -18,8 +18,8 @@ import { named, placeUnits, pressureText, units } from "../shared/units.js";
 
 /** @typedef {Awaited<ReturnType<typeof lifeOf>>} Life a life of a clutch, as it is compared, with its own tests */
 
-/** @type {[string, string][]} quantities that every stationary test gives */
-const CHOICES = ["mean_cof", ...PARAMETER_NAMES].map((key) => [key, QUANTITIES[key].title]);
+/** Quantities that every stationary test gives. */
+const CHOICES = optionsOf(QUANTITIES, ["mean_cof", ...PARAMETER_NAMES]);
 /** @type {[string, string][]} */
 const VALUES = Object.entries({ share: "normalised to new", measured: "as measured" });
 /** How many states of a life are drawn. */
@@ -96,8 +96,7 @@ function overLifeOf(lives, quantity, share) {
     ];
   });
   if (drawn.length === 0) return { empty: "None of the compared lives has a stationary test yet." };
-  const { title, unit } = QUANTITIES[quantity];
-  const axis = share ? `${title}, share of new` : `${title}${unit && `, ${unit}`}`;
+  const axis = share ? `${QUANTITIES[quantity].title}, share of new` : titleOf(QUANTITIES[quantity]);
   return {
     note: share
       ? "Each life relative to its own first test: 1 is new."

@@ -6,7 +6,7 @@ import { read, sendJson } from "../shared/api.js";
 import { agreed } from "../shared/dialog.js";
 import { button, h, quiet } from "../shared/dom.js";
 import { words } from "../shared/format.js";
-import { problemView } from "../shared/problem_view.js";
+import { attempted } from "../shared/problem_view.js";
 import { charts } from "./charts.js";
 import { lifeBars, report as reportView } from "./report.js";
 
@@ -38,13 +38,12 @@ export function diagnosisTab(place, reader, changed) {
   let model = null;
   let due = true;
   const run = button("Run the diagnosis", start, { class: "main" });
-  const status = h("span.quiet", { role: "status" });
-  const wrong = h("div");
+  const answer = h("div", { role: "status" });
   const content = h("div");
   const drawings = charts(reader.name);
   const figures = h("div.charts", { hidden: true }, ...drawings.map(({ chart }) => chart.element));
-  const buttons = h("div.row.buttons.start", run, status);
-  place.append(h("div.panel.diagnosis", h("p.question", QUESTION), buttons, wrong, content), figures);
+  const buttons = h("div.row.buttons.start", run);
+  place.append(h("div.panel.diagnosis", h("p.question", QUESTION), buttons, answer, content), figures);
 
   /** Read the newest report where there is another than last time. */
   async function poll() {
@@ -146,20 +145,12 @@ export function diagnosisTab(place, reader, changed) {
     );
 
   /** @type {(under: string, work: () => Promise<void>, done?: string) => Promise<void>} said meanwhile, and at the end */
-  async function doing(under, work, done = "") {
-    const all = [...content.querySelectorAll("button"), run];
-    for (const each of all) each.disabled = true;
-    status.textContent = under;
-    wrong.replaceChildren();
-    try {
+  function doing(under, work, done = "") {
+    const ended = async () => {
       await work();
-      status.textContent = done;
-    } catch (problem) {
-      status.textContent = "";
-      wrong.replaceChildren(problemView(problem, "Nothing was changed. "));
-    } finally {
-      for (const each of all) each.disabled = false;
-    }
+      answer.replaceChildren(done && quiet(done));
+    };
+    return attempted([...content.querySelectorAll("button"), run], answer, under, ended, "Nothing was changed. ");
   }
 
   return {

@@ -54,7 +54,7 @@ export function report(diagnosis) {
       diagnosis.summary ? h("p", diagnosis.summary) : null,
       quiet(date, outdated(diagnosis)),
     ),
-    h("div.columns", ...PARTS.map((each) => each(diagnosis))),
+    h("div.columns", ...Object.values(PARTS).map((part) => part(diagnosis))),
   ];
 }
 
@@ -94,21 +94,6 @@ export function sentence(diagnosis) {
 /** @type {(title: string, ...content: Content[]) => HTMLElement} */
 const part = (title, ...content) => h("div.part", h("h3", title), ...content);
 
-/** @param {DiagnosisOut} diagnosis */
-function candidates({ candidates: all = [], causes = [] }) {
-  if (all.length === 0) return null;
-  const rows = all.slice(0, MOST_ROWS).map(({ effect, title, probability: chance, estimate }) => {
-    const name = estimate?.name ? `${words(estimate.name)} ` : "";
-    return [
-      h("span", { class: causes.includes(effect) ? "named" : null, title: effect }, title || words(effect)),
-      h("span.chance", shareBar(chance ?? 0, "likely"), probability(chance)),
-      estimate ? `${name}${withSd(estimate.value, estimate.sd)} ${estimate.unit.replace(/^[-1]$/, "")}` : "–",
-    ];
-  });
-  const columns = ["Cause", "Probability", "Estimate"];
-  return h("div.part.wide", h("h3", "Candidates"), scrolling("Candidates", table("Candidate causes", columns, rows)));
-}
-
 /**
  * Log evidence in a word (thresholds of Kass and Raftery, 1 and 3 in natural logarithms); the number under the pointer.
  * @param {number | null} value
@@ -117,29 +102,6 @@ function evidence(value) {
   if (value === null) return "–";
   const word = value < 0 ? "none" : value < 1 ? "weak" : value < 3 ? "moderate" : "strong";
   return h("span", { title: `log evidence ${fixed(value, 1)}` }, word);
-}
-
-/** @param {DiagnosisOut} diagnosis */
-function fitness({ baseline, extended }) {
-  if (!baseline) return null;
-  /** @type {(name: string, misfit: MisfitOut) => string[]} */
-  const line = (name, misfit) => [
-    name,
-    significant(misfit.rmse_nm, 3),
-    significant(misfit.noise_nm, 3),
-    percent(misfit.unexplained_share, 1),
-  ];
-  const rows = [line("Baseline", baseline), ...(extended ? [line("Extended", extended)] : [])];
-  return part("Fit to all runs", table("Fit", ["Model", "RMSE, Nm", "Noise, Nm", "Unexplained"], rows));
-}
-
-/** @param {DiagnosisOut} diagnosis */
-function gain({ gain: gained }) {
-  if (!gained) return null;
-  const bars = gained.remaining_useful_life ? lifeBars(gained.remaining_useful_life) : null;
-  const error = errorGain(gained);
-  if (error === null && bars === null) return null;
-  return part("Gain on runs that were left out of the fit", error, bars && h("h4", "Remaining cycles"), bars);
 }
 
 /** @param {GainOut} gained */
@@ -163,60 +125,92 @@ function errorGain(gained) {
 const scoreText = (place, gained) =>
   gained === null || gained === undefined ? "" : `log score ${gained >= 0 ? "+" : ""}${fixed(gained, 1)} ${place}`;
 
-/** @param {DiagnosisOut} diagnosis */
-function where({ baseline }) {
-  const axes = baseline?.where ?? [];
-  if (axes.length === 0) return null;
-  const rows = axes.slice(0, MOST_ROWS).map(({ axis, strength, p_value: p }) => {
-    return [quantity(axis), evidence(strength), p !== null && p < 0.001 ? "< 0.001" : significant(p, 2)];
-  });
-  return part("Where the baseline model is wrong", table("Where", ["Along", "Evidence", "p"], rows));
-}
-
-/** @param {DiagnosisOut} diagnosis */
-function advice({ advice: tests = [], clutch_id: clutch, diagnosis_id: name }) {
-  if (tests.length === 0) return null;
-  const items = tests.map(({ test, separates, narrows }) => {
-    const [cause, other] = separates.map((effect) => words(effect).toLowerCase());
-    const use = narrows
-      ? `narrows the size of ${cause} to ${percent(narrows)} of its present uncertainty`
-      : `distinguishes ${cause} from ${other === "baseline" ? "no effect at all" : other}`;
-    return h("li", h("b", test), h("span.quiet", `: ${use}`));
-  });
-  const choice = tests.length > 1 ? h("p", "One of these is enough; the best comes first.") : null;
-  const plan = files(`${clutch}-plan`, `${clutchPath(clutch)}/diagnoses/${name}/plan.csv`);
-  return part("What to test next", choice, h("ol", items), quiet("The plan for the rig: ", plan));
-}
-
-/** @param {DiagnosisOut} diagnosis */
-function notes({ notes: all = [] }) {
-  const items = all.map((note) => h("li", note));
-  return items.length > 0 ? part("Notes", h("ul", items)) : null;
-}
-
 const VISIBLE =
   "For each effect, the smallest size that these runs can show: in its least visible shape, and in its most visible shape. " +
   "No number means that the least visible shape stays hidden at any size.";
 
-/** @param {DiagnosisOut} diagnosis */
-function visible({ visible: all = [] }) {
-  if (all.length === 0) return null;
-  const rows = all.map(({ effect, amplitude, least, unit }) => [
-    words(effect),
-    significant(amplitude, 3),
-    significant(least, 3),
-    unit ?? "",
-  ]);
-  const label = "Smallest visible sizes";
-  return h(
-    "details.part",
-    h("summary", "What these runs can show"),
-    quiet(VISIBLE),
-    scrolling(label, table(label, ["Effect", "For every shape", "For the most visible", "Unit"], rows)),
-  );
-}
+/** @type {Record<string, (diagnosis: DiagnosisOut) => HTMLElement | null>} */
+const PARTS = {
+  candidates({ candidates: all = [], causes = [] }) {
+    if (all.length === 0) return null;
+    const rows = all.slice(0, MOST_ROWS).map(({ effect, title, probability: chance, estimate }) => {
+      const name = estimate?.name ? `${words(estimate.name)} ` : "";
+      return [
+        h("span", { class: causes.includes(effect) ? "named" : null, title: effect }, title || words(effect)),
+        h("span.chance", shareBar(chance ?? 0, "likely"), probability(chance)),
+        estimate ? `${name}${withSd(estimate.value, estimate.sd)} ${estimate.unit.replace(/^[-1]$/, "")}` : "–",
+      ];
+    });
+    const columns = ["Cause", "Probability", "Estimate"];
+    return h("div.part.wide", h("h3", "Candidates"), scrolling("Candidates", table("Candidate causes", columns, rows)));
+  },
 
-const PARTS = [candidates, fitness, gain, where, advice, notes, visible];
+  fitness({ baseline, extended }) {
+    if (!baseline) return null;
+    /** @type {(name: string, misfit: MisfitOut) => string[]} */
+    const line = (name, misfit) => [
+      name,
+      significant(misfit.rmse_nm, 3),
+      significant(misfit.noise_nm, 3),
+      percent(misfit.unexplained_share, 1),
+    ];
+    const rows = [line("Baseline", baseline), ...(extended ? [line("Extended", extended)] : [])];
+    return part("Fit to all runs", table("Fit", ["Model", "RMSE, Nm", "Noise, Nm", "Unexplained"], rows));
+  },
+
+  gain({ gain: gained }) {
+    if (!gained) return null;
+    const bars = gained.remaining_useful_life ? lifeBars(gained.remaining_useful_life) : null;
+    const error = errorGain(gained);
+    if (error === null && bars === null) return null;
+    return part("Gain on runs that were left out of the fit", error, bars && h("h4", "Remaining cycles"), bars);
+  },
+
+  where({ baseline }) {
+    const axes = baseline?.where ?? [];
+    if (axes.length === 0) return null;
+    const rows = axes.slice(0, MOST_ROWS).map(({ axis, strength, p_value: p }) => {
+      return [quantity(axis), evidence(strength), p !== null && p < 0.001 ? "< 0.001" : significant(p, 2)];
+    });
+    return part("Where the baseline model is wrong", table("Where", ["Along", "Evidence", "p"], rows));
+  },
+
+  advice({ advice: tests = [], clutch_id: clutch, diagnosis_id: name }) {
+    if (tests.length === 0) return null;
+    const items = tests.map(({ test, separates, narrows }) => {
+      const [cause, other] = separates.map((effect) => words(effect).toLowerCase());
+      const use = narrows
+        ? `narrows the size of ${cause} to ${percent(narrows)} of its present uncertainty`
+        : `distinguishes ${cause} from ${other === "baseline" ? "no effect at all" : other}`;
+      return h("li", h("b", test), h("span.quiet", `: ${use}`));
+    });
+    const choice = tests.length > 1 ? h("p", "One of these is enough; the best comes first.") : null;
+    const plan = files(`${clutch}-plan`, `${clutchPath(clutch)}/diagnoses/${name}/plan.csv`);
+    return part("What to test next", choice, h("ol", items), quiet("The plan for the rig: ", plan));
+  },
+
+  notes({ notes: all = [] }) {
+    const items = all.map((note) => h("li", note));
+    return items.length > 0 ? part("Notes", h("ul", items)) : null;
+  },
+
+  visible({ visible: all = [] }) {
+    if (all.length === 0) return null;
+    const rows = all.map(({ effect, amplitude, least, unit }) => [
+      words(effect),
+      significant(amplitude, 3),
+      significant(least, 3),
+      unit ?? "",
+    ]);
+    const label = "Smallest visible sizes";
+    return h(
+      "details.part",
+      h("summary", "What these runs can show"),
+      quiet(VISIBLE),
+      scrolling(label, table(label, ["Effect", "For every shape", "For the most visible", "Unit"], rows)),
+    );
+  },
+};
 
 /** @typedef {Quantiles | { remaining_cycles?: Quantiles } | null | undefined} Answer quantiles by name, or what holds them */
 

@@ -4,15 +4,15 @@
 import { Chart, chooser, setControls } from "../charts/chart.js";
 import { column, CYCLES, digitsColumn, HALF_OF_90, KIND } from "../charts/columns.js";
 import { lineOf, measuredLine, planar } from "../charts/traces.js";
-import { INDICATORS, stateOptions } from "../quantities/names.js";
+import { INDICATORS, optionsOf, stateOptions, titleOf } from "../quantities/names.js";
 import { clutchPath, Problem, read } from "../shared/api.js";
 import { fixed, percent, significant } from "../shared/format.js";
 
-/** The channels of a trace: what it is, and its unit. */
+/** The channels of a trace. */
 const CHANNELS = {
-  torque_nm: ["Friction torque", "Nm"],
-  speed_rpm: ["Sliding speed", "rpm"],
-  pressure_bar: ["Line pressure", "bar"],
+  torque_nm: { title: "Friction torque", unit: "Nm" },
+  speed_rpm: { title: "Sliding speed", unit: "rpm" },
+  pressure_bar: { title: "Line pressure", unit: "bar" },
 };
 
 /** @typedef {keyof typeof INDICATORS} Indicator */
@@ -22,9 +22,6 @@ const NO_ENGAGEMENT =
   "No measured engagement yet. Send one with a block of duty: time_s, pressure_bar, speed_rpm and torque_nm of one engagement.";
 const NO_VALUE = "None of the engagements determines this indicator.";
 const NO_COMPARISON = "To simulate an engagement, the present life needs a stationary test and a measured engagement.";
-
-/** @param {[string, string] | string[]} named */
-const titleOf = ([title, unit]) => (unit === "" ? title : `${title}, ${unit}`);
 
 /** @type {(answers: { measured: MeasuredEngagement[], events: Receipt[], name: Indicator }) => Spec} */
 function indicatorOverLife({ measured, events, name }) {
@@ -64,7 +61,7 @@ function engagementTrace({ compared, name }) {
 function traceOf(kind, trace, name, c) {
   const measured = kind === "measured";
   const line = measured ? { color: c.accent, width: 1.6 } : { color: c.worn, width: 1.6, dash: "dash" };
-  const text = `${kind}<br>%{x:.2f} s, %{y:.4g} ${CHANNELS[name][1]}`;
+  const text = `${kind}<br>%{x:.2f} s, %{y:.4g} ${CHANNELS[name].unit}`;
   return lineOf(measured ? "measured" : "tracked model", { x: trace.time_s, y: trace[name] }, line, text);
 }
 
@@ -81,15 +78,6 @@ function discrepancyOf({ model }) {
 
 /** @type {Pick<EngagementOut, "measured" | "compared">} */
 const NOTHING = { measured: [], compared: null };
-
-/**
- * @template {string} Name
- * @param {Record<Name, string[]>} named each with its title
- */
-function optionsOf(named) {
-  const names = /** @type {Name[]} */ (Object.keys(named));
-  return names.map((name) => /** @type {[Name, string]} */ ([name, named[name][0]]));
-}
 
 /** @typedef {{ id: string, name: () => string } & Record<"runs" | "events", () => Promise<Receipt[]>>} Reader of a clutch */
 

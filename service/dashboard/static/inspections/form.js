@@ -75,7 +75,7 @@ export function inspectionForm(path, sent) {
 
   const onsubmit = (/** @type {SubmitEvent} */ event) => {
     event.preventDefault();
-    attempted(go, answer, "Sending …", store);
+    attempted([go], answer, "Sending …", store);
   };
   const fields = h(
     "div.fields",

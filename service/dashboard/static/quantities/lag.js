@@ -15,7 +15,7 @@ import { spread } from "../charts/stribeck.js";
 import { linesByPressure, measuredLine, planar, tracked } from "../charts/traces.js";
 import { fixed } from "../shared/format.js";
 import { pressureText } from "../shared/units.js";
-import { levelsOf, QUANTITIES } from "./names.js";
+import { levelsOf, QUANTITIES, titleOf } from "./names.js";
 
 /** @typedef {"loop_area" | "attractor" | "film_time"} LagName */
 
@@ -30,8 +30,8 @@ export const LAG_NAMES = /** @type {LagName[]} */ (Object.keys(MEANINGS));
 
 /** @param {LagName} name */
 function axisOf(name) {
-  const { title, unit } = QUANTITIES[name];
-  return `${title.charAt(0).toLowerCase()}${title.slice(1)}, ${unit}`;
+  const title = titleOf(QUANTITIES[name]);
+  return `${title.charAt(0).toLowerCase()}${title.slice(1)}`;
 }
 
 /** @type {(name: LagName) => Column[]} */

@@ -30,25 +30,27 @@ export const levelOptions = (levels) => levels.map((level) => [level, pressureTe
 /** @type {(tests: { run_id: string, cycles: number }[]) => [string, string][]} */
 export const stateOptions = (tests) => tests.map((test) => [test.run_id, `${fixed(test.cycles)} cycles`]);
 
-/** The indicators of an engagement by name: what it is, and its unit. */
+/** @typedef {{ title: string, unit: string }} Titled what a quantity is, and its unit */
+
+/** The indicators of an engagement by name. */
 export const INDICATORS = {
-  stop_time_s: ["Stop time", "s"],
-  midpoint_cof: ["Midpoint COF", ""],
-  initial_cof: ["Initial COF", ""],
-  endpoint_cof: ["Endpoint COF", ""],
-  breakaway_cof: ["Breakaway COF", ""],
-  initial_cof_ratio: ["Initial COF / midpoint COF", ""],
-  endpoint_cof_ratio: ["Endpoint COF / midpoint COF", ""],
-  breakaway_cof_ratio: ["Breakaway COF / midpoint COF", ""],
-  torque_rise: ["Rise of torque at the end", ""],
-  engagement_energy_kj: ["Energy", "kJ"],
-  peak_power_kw: ["Peak power", "kW"],
-  normalised_duration: ["Duration relative to the first engagement", ""],
-  euclidean_distance: ["Distance of speed from the first engagement", ""],
-  spectral_angle_rad: ["Spectral angle to the first engagement", "rad"],
+  stop_time_s: { title: "Stop time", unit: "s" },
+  midpoint_cof: { title: "Midpoint COF", unit: "" },
+  initial_cof: { title: "Initial COF", unit: "" },
+  endpoint_cof: { title: "Endpoint COF", unit: "" },
+  breakaway_cof: { title: "Breakaway COF", unit: "" },
+  initial_cof_ratio: { title: "Initial COF / midpoint COF", unit: "" },
+  endpoint_cof_ratio: { title: "Endpoint COF / midpoint COF", unit: "" },
+  breakaway_cof_ratio: { title: "Breakaway COF / midpoint COF", unit: "" },
+  torque_rise: { title: "Rise of torque at the end", unit: "" },
+  engagement_energy_kj: { title: "Energy", unit: "kJ" },
+  peak_power_kw: { title: "Peak power", unit: "kW" },
+  normalised_duration: { title: "Duration relative to the first engagement", unit: "" },
+  euclidean_distance: { title: "Distance of speed from the first engagement", unit: "" },
+  spectral_angle_rad: { title: "Spectral angle to the first engagement", unit: "rad" },
 };
 
-/** @type {Record<string, { title: string, unit: string }>} */
+/** @type {Record<string, Titled>} */
 export const QUANTITIES = {
   mean_cof: { title: "Mean COF", unit: "" },
   ...PARAMETERS,
@@ -57,5 +59,17 @@ export const QUANTITIES = {
   attractor: { title: "Attractor C", unit: "Nm/s" },
   film_time: { title: "Film time", unit: "s" },
   loop_area: { title: "Loop area", unit: "Nm·m/s" },
-  ...Object.fromEntries(Object.entries(INDICATORS).map(([name, [title, unit]]) => [name, { title, unit }])),
+  ...INDICATORS,
 };
+
+/** @type {(quantity: Titled) => string} */
+export const titleOf = ({ title, unit }) => (unit === "" ? title : `${title}, ${unit}`);
+
+/**
+ * What is chosen of several quantities, each with its title.
+ * @template {string} Name
+ * @param {Record<Name, { title: string }>} quantities
+ * @param {Name[]} names
+ */
+export const optionsOf = (quantities, names = /** @type {Name[]} */ (Object.keys(quantities))) =>
+  names.map((name) => /** @type {[Name, string]} */ ([name, quantities[name].title]));

@@ -9,7 +9,7 @@ import { cycles, interval } from "../shared/format.js";
 import { problemView } from "../shared/problem_view.js";
 import { criterionRow, OWN_COLUMNS } from "./criteria.js";
 import { LAG_NAMES } from "./lag.js";
-import { levelOptions, QUANTITIES, usual } from "./names.js";
+import { levelOptions, optionsOf, QUANTITIES, usual } from "./names.js";
 
 /** @type {string[]} */
 const OF_CURVES = ["mean_cof", ...PARAMETER_NAMES, "slope"];
@@ -20,8 +20,7 @@ const ABOUT =
   "limit is the same share of the initial value as for mean COF; for a slope, the limit is 0 at 100 rpm.";
 /** @type {["all", string][]} */
 const ALL = [["all", "all pressures"]];
-/** @type {[string, string][]} */
-const NAMES = Object.entries(QUANTITIES).map(([name, { title }]) => [name, title]);
+const NAMES = optionsOf(QUANTITIES);
 
 /**
  * The levels that a quantity is tracked at, bar; none for those that have no pressure of their own.

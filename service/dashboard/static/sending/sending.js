@@ -4,7 +4,7 @@
 
 import { clutchPath, Problem, read } from "../shared/api.js";
 import { answered, button, field, h } from "../shared/dom.js";
-import { problemView } from "../shared/problem_view.js";
+import { attempted } from "../shared/problem_view.js";
 import { batchOf } from "./batch.js";
 import { IDENTIFIER, register } from "./registration.js";
 import { registeredLike, similarRegistered } from "./similar_names.js";
@@ -27,9 +27,10 @@ function open(batch, page) {
   const suggestions = h("datalist", { id: "registered" });
   const answer = h("div.answer", { role: "status" });
   const go = h("button.main");
-  const onsubmit = (/** @type {SubmitEvent} */ event) => {
+  const onsubmit = async (/** @type {SubmitEvent} */ event) => {
     event.preventDefault();
-    send();
+    await attempted([go], answer, "", send);
+    showGo();
   };
   const close = button("Close", () => dialog.close());
   const elements = runs.map((run) => run.element);
@@ -83,18 +84,9 @@ function open(batch, page) {
   }
 
   async function send() {
-    go.disabled = true;
-    answer.replaceChildren();
-    try {
-      const id = await registered(clutch.value.trim());
-      if (id === null) answer.replaceChildren(h("p.notice", "Nothing was sent."));
-      else await sendAll(id);
-    } catch (problem) {
-      answer.replaceChildren(problemView(problem));
-    } finally {
-      go.disabled = false;
-      showGo();
-    }
+    const id = await registered(clutch.value.trim());
+    if (id === null) answer.replaceChildren(h("p.notice", "Nothing was sent."));
+    else await sendAll(id);
   }
 
   /** @param {string} id */

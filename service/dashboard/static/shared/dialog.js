@@ -37,7 +37,7 @@ export function asked({ title, lines = [], fields = [], action, leave = "Cancel"
       result = await send();
       dialog.close();
     };
-    await attempted(go, answer, "Computing …", work, lead ?? "Nothing was changed. ");
+    await attempted([go], answer, "Computing …", work, lead ?? "Nothing was changed. ");
   };
   const cancel = leave !== null && button(leave, () => dialog.close());
   const form = h("div.fields", fields);

@@ -28,21 +28,21 @@ export function problemView(problem, lead) {
 }
 
 /**
- * Do what a form asks for: its button rests meanwhile, and `answer` says what is under way, then what went wrong.
- * @param {HTMLButtonElement} go
+ * Do what is asked for: its buttons rest meanwhile, and `answer` says what is under way, then what went wrong.
+ * @param {HTMLButtonElement[]} buttons
  * @param {HTMLElement} answer
  * @param {string} status
  * @param {() => Promise<unknown>} work
  * @param {string} [lead] what has not happened
  */
-export async function attempted(go, answer, status, work, lead) {
-  go.disabled = true;
-  answer.replaceChildren(quiet(status));
+export async function attempted(buttons, answer, status, work, lead) {
+  for (const each of buttons) each.disabled = true;
+  answer.replaceChildren(status && quiet(status));
   try {
     await work();
   } catch (problem) {
     answer.replaceChildren(problemView(problem, lead));
   } finally {
-    go.disabled = false;
+    for (const each of buttons) each.disabled = false;
   }
 }

@@ -3,39 +3,32 @@
 (() => {
   /** @type {Record<string, string>} */
   const NAMES = { auto: "Theme: system", light: "Theme: light", dark: "Theme: dark" };
-  const stored = () => {
-    try {
-      return localStorage.getItem("theme") ?? "auto";
-    } catch {
-      return "auto";
-    }
+  let theme = "auto";
+  try {
+    theme = localStorage.getItem("theme") ?? theme;
+  } catch {
+    /* a browser that stores nothing: the choice holds for this page only */
+  }
+  if (!NAMES[theme]) theme = "auto";
+  const apply = () => {
+    document.documentElement.dataset.theme = theme;
+    const button = document.getElementById("theme");
+    if (button !== null) button.textContent = NAMES[theme];
   };
-  /** @param {string} theme */
-  const apply = (theme) => {
-    if (theme === "auto") document.documentElement.removeAttribute("data-theme");
-    else document.documentElement.dataset.theme = theme;
-  };
-  apply(stored());
+  apply();
   const changed = () => document.dispatchEvent(new Event("themechange"));
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", changed);
   document.addEventListener("DOMContentLoaded", () => {
-    const button = document.getElementById("theme");
-    if (button === null) return;
-    let theme = NAMES[stored()] ? stored() : "auto";
-    const label = () => {
-      button.textContent = NAMES[theme];
-    };
-    label();
-    button.addEventListener("click", () => {
+    apply();
+    document.getElementById("theme")?.addEventListener("click", () => {
       const order = Object.keys(NAMES);
       theme = order[(order.indexOf(theme) + 1) % order.length];
       try {
         localStorage.setItem("theme", theme);
       } catch {
-        /* a browser that stores nothing: for this page only */
+        /* the same */
       }
-      apply(theme);
-      label();
+      apply();
       changed();
     });
   });
