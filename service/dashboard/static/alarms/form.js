@@ -32,7 +32,7 @@ export function ruleText({ quantity, below, above, probability, any_of: names })
 }
 
 /** @type {(id: string, value: string) => HTMLInputElement} */
-const input = (id, value) => h("input", { id, value, autocomplete: "off" });
+const input = (id, value) => h("input", { id, value });
 
 /**
  * @param {AlarmOut | null} rule null: a new one
@@ -92,7 +92,7 @@ export function askRule(rule, clutchId) {
 
 /** @param {string | null} clutchId of a clutch's page */
 export function askReceiver(clutchId) {
-  const url = h("input", { id: "receiver-url", type: "text", required: true, autocomplete: "off" });
+  const url = h("input", { id: "receiver-url", type: "text", required: true });
   const name = input("receiver-name", "");
   const about = "https:// for a signed webhook; with the extra notify also mailtos://, msteams://, slack://, ntfys://";
   const fields = [field(url, "Address", h("small", about)), field(name, "Name (optional)")];

@@ -8,7 +8,6 @@ export const NAMES = /** @type {const} */ ([
   "panel",
   "accent",
   "failure",
-  "out",
   "check",
   "normal",
   "maintenance",

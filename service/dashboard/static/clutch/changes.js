@@ -302,7 +302,7 @@ export const askTakeBack = (id, end) =>
 function ask({ title, lines, action, optional = false, cycles, choice, note, send }) {
   const numeric = { type: "number", min: 0, step: "any", required: true, inputmode: "decimal" };
   const number = h("input", { id: "changed-cycles", value: cycles, ...numeric });
-  const reason = h("input", { id: "reason", required: !optional, maxlength: LONGEST_REASON, autocomplete: "off" });
+  const reason = h("input", { id: "reason", required: !optional, maxlength: LONGEST_REASON });
   const options = choice?.options.map(([value, text]) => h("option", { value }, text)) ?? [];
   const chosen = h("select", { id: "chosen", required: true }, ...options);
   const closed = asked({

@@ -3,7 +3,7 @@
 import { limitText, placeText } from "../quantities/criteria.js";
 import { h, menu } from "../shared/dom.js";
 import { fixed, percent, words } from "../shared/format.js";
-import { heldText, stateIcon } from "../shared/state.js";
+import { colourOf, heldText, stateIcon } from "../shared/state.js";
 
 /**
  * @param {ClutchOut} clutch
@@ -29,7 +29,7 @@ export function head(clutch, { archive, end }) {
       ),
       h(
         "p",
-        { class: `row verdict state state-${state.name}`, id: "headline" },
+        { class: "row verdict state", style: colourOf(state.name), id: "headline" },
         stateIcon(state.name),
         h("b", word),
         h("span.says", rest.join(": ")),

@@ -13,6 +13,7 @@ import { read } from "../shared/api.js";
 import { h } from "../shared/dom.js";
 import { atLeast, estimate, fixed, likely, percent, probability, roundedDown } from "../shared/format.js";
 import { shareBar } from "../shared/sparkline.js";
+import { colourOf } from "../shared/state.js";
 import { firstRun } from "../shared/welcome.js";
 import { plannedDuty } from "./planned_duty.js";
 import { heldView, warningsView } from "./warnings.js";
@@ -121,8 +122,9 @@ function tiles(clutch, life) {
   const place = share === null ? `at ${fixed(current.measured_at_cycles)} cycles` : `${percent(share, 1)} of new`;
   const used = `${life.runs_used} ${life.runs_used === 1 ? "test" : "tests"} used, ${clutch.runs} runs`;
   const sure = course ? `${probability(course.probability)} sure` : life.runs_used > 2 ? "" : "after three tests";
+  const look = { class: "health", style: colourOf(clutch.state.name) };
   return [
-    tile("Health", percent(health), health === null ? null : shareBar(health, `health state-${clutch.state.name}`)),
+    tile("Health", percent(health), health === null ? null : shareBar(health, look)),
     tile(predicts(life) ? "Safe for, cycles (95 %)" : "Remaining cycles", remaining(life), small(remainingNotes(life))),
     tile("Mean COF", cof, small(`${deviation ? `± ${deviation}; ` : ""}${place}`)),
     tile("Duty cycles so far", fixed(life.as_of_cycles), small(used)),

@@ -1,7 +1,7 @@
 // Planned duty: a form of blocks and a pace, and the remaining life under them. Nothing of it is stored.
 
 import { clutchPath, Problem, sendJson } from "../shared/api.js";
-import { button, field, h, quiet, scrolling, table } from "../shared/dom.js";
+import { button, field, form, h, quiet, scrolling, table } from "../shared/dom.js";
 import { fixed, NOT_A_NUMBER, numberOf, significant, sentence } from "../shared/format.js";
 import { attempted } from "../shared/problem_view.js";
 
@@ -21,7 +21,7 @@ let count = 0;
 /** @type {(name: string, label: string, value?: string) => HTMLElement} a number of the form, below it what is wrong with it */
 function entry(name, label, value = "") {
   const id = `planned-${(count += 1)}`;
-  const attributes = { inputmode: "decimal", autocomplete: "off", "aria-describedby": `${id}-wrong` };
+  const attributes = { inputmode: "decimal", "aria-describedby": `${id}-wrong` };
   return field(h("input", { id, name, value, ...attributes }), label, h("p.wrong", { id: `${id}-wrong` }));
 }
 
@@ -41,14 +41,13 @@ export function plannedDuty(place, clutchId) {
     focusLast();
   };
   const buttons = h("div.row.buttons", button("Add a block", add), go);
-  const onsubmit = (/** @type {SubmitEvent} */ event) => {
-    event.preventDefault();
+  const submit = () => {
     countedBy = undefined;
     ask();
   };
-  const form = h("form", { novalidate: true, onsubmit }, all, h("div.fields", pace), buttons, answer);
+  const plan = form(submit, all, h("div.fields", pace), buttons, answer);
   const about = "The blocks run one after the other and repeat until the end of life. Fields may stay empty.";
-  place.append(h("details.planned", h("summary", "Planned duty"), quiet(about), form));
+  place.append(h("details.planned", h("summary", "Planned duty"), quiet(about), plan));
   append();
 
   const focusLast = () => blocks.at(-1)?.element.querySelector("input")?.focus();
@@ -87,7 +86,7 @@ export function plannedDuty(place, clutchId) {
   }
 
   async function ask() {
-    const inputs = inputsOf(form);
+    const inputs = inputsOf(plan);
     for (const input of inputs) mark(input, "");
     for (const input of inputs) if (numberOf(input.value) === undefined) mark(input, NOT_A_NUMBER);
     answer.replaceChildren();
@@ -112,7 +111,7 @@ export function plannedDuty(place, clutchId) {
 
   /** Whether a number is wrong: the first that is has the focus then. */
   function focusWrong() {
-    const first = inputsOf(form).find((input) => input.hasAttribute("aria-invalid"));
+    const first = inputsOf(plan).find((input) => input.hasAttribute("aria-invalid"));
     first?.focus();
     return first !== undefined;
   }

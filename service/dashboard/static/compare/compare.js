@@ -10,7 +10,7 @@ import { curveOf, xyOf } from "../charts/stribeck_law.js";
 import { planar, titled } from "../charts/traces.js";
 import { levelsOf, optionsOf, QUANTITIES, titleOf, usual } from "../quantities/names.js";
 import { clutchPath, read, readAll } from "../shared/api.js";
-import { button, byId, h } from "../shared/dom.js";
+import { button, byId, form, h } from "../shared/dom.js";
 import { fixed } from "../shared/format.js";
 import { Live } from "../shared/live.js";
 import { heldText } from "../shared/state.js";
@@ -179,14 +179,11 @@ function drawForm(lives) {
       button("Leave out", () => replace(null), { class: "small", "aria-label": `Remove ${life.label}` }),
     );
   });
-  const input = h("input", { id: "add", placeholder: "clutch", autocomplete: "off", required: true });
-  const add = (/** @type {Event} */ event) => {
-    event.preventDefault();
-    go((query) => query.append("clutch", input.value.trim()));
-  };
+  const input = h("input", { id: "add", placeholder: "clutch", required: true });
+  const add = () => go((query) => query.append("clutch", input.value.trim()));
   byId("choices").replaceChildren(
     h("ul.compared", entries),
-    h("form.row.finding", { onsubmit: add }, h("label", { for: "add" }, "Add"), input, h("button", "Add")),
+    form(add, h("div.row.finding", h("label", { for: "add" }, "Add"), input, h("button", "Add"))),
     h(
       "div.row.controls",
       choice("Quantity", CHOICES, quantity, (value) => go((query) => query.set("quantity", value))),

@@ -17,13 +17,8 @@ const NEVER_RUN = "No diagnosis has been run yet. It reads the stored runs and c
 /** @param {BeforeAndAfter | null | undefined} life remaining life under both models */
 const nowAndThen = (life) => life && lifeBars(life, ["Now", "Then"]);
 
-/**
- * @typedef {object} Reader of a clutch
- * @property {string} path
- * @property {() => string} name the start of saved files' names
- * @property {() => { runs: number }} present
- * @property {() => Promise<{ model: ModelName }>} life
- */
+/** @typedef {{ path: string, name: () => string }} Named a clutch; `name`: the start of saved files' names */
+/** @typedef {Named & { present: () => Pick<ClutchOut, "runs">, life: () => Promise<RemainingLife> }} Reader of it */
 
 /**
  * @param {HTMLElement} place the section's body

@@ -137,7 +137,7 @@ const PARTS = {
       const name = estimate?.name ? `${words(estimate.name)} ` : "";
       return [
         h("span", { class: causes.includes(effect) ? "named" : null, title: effect }, title || words(effect)),
-        h("span.chance", shareBar(chance ?? 0, "likely"), probability(chance)),
+        h("span.chance", shareBar(chance ?? 0, { class: "likely" }), probability(chance)),
         estimate ? `${name}${withSd(estimate.value, estimate.sd)} ${estimate.unit.replace(/^[-1]$/, "")}` : "–",
       ];
     });

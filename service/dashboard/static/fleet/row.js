@@ -3,7 +3,7 @@
 import { h } from "../shared/dom.js";
 import { age, atLeast, cycles, fixed, kindName, likely, percent, words } from "../shared/format.js";
 import { intervalBar, shareBar, sparkline } from "../shared/sparkline.js";
-import { heldText, stateIcon, STATES, VERDICTS } from "../shared/state.js";
+import { colourOf, heldText, stateIcon, STATES, VERDICTS } from "../shared/state.js";
 
 /** @import { Content } from "../shared/dom.js" */
 /** @import { StateName } from "../shared/state.js" */
@@ -67,7 +67,9 @@ const small = (text) => h("small", text);
 /** @type {(summary: ClutchSummary | null, state: StateName) => string[] | (HTMLElement | SVGSVGElement)[]} */
 function health(summary, state) {
   const value = summary?.current.health ?? null;
-  return value === null ? ["–"] : [number(percent(value)), shareBar(value, `health state-${state}`)];
+  return value === null
+    ? ["–"]
+    : [number(percent(value)), shareBar(value, { class: "health", style: colourOf(state) })];
 }
 
 /**

@@ -2,7 +2,7 @@
 // that a form whose photographs were refused in part is mended and sent once more.
 
 import { send, sendJson } from "../shared/api.js";
-import { field, h, symbol } from "../shared/dom.js";
+import { field, form, h, symbol } from "../shared/dom.js";
 import { fixed } from "../shared/format.js";
 import { attempted, problemView } from "../shared/problem_view.js";
 
@@ -13,7 +13,7 @@ const LONGEST_NAME = 200;
 const LONGEST_NOTE = 4000;
 
 /** @type {(name: string, attributes: Record<string, string | number | boolean>) => HTMLInputElement} */
-const input = (name, attributes) => h("input", { id: `inspection-${name}`, name, autocomplete: "off", ...attributes });
+const input = (name, attributes) => h("input", { id: `inspection-${name}`, name, ...attributes });
 
 /** @param {HTMLInputElement} element */
 const numberIn = ({ value }) => (value === "" ? null : Number(value));
@@ -68,15 +68,11 @@ export function inspectionForm(path, sent) {
         refused.push(problemView(problem, `${file.name} is not stored. `));
       }
     }
-    if (refused.length === 0) form.reset();
+    if (refused.length === 0) typed.reset();
     answer.replaceChildren(outcomeOf(body), ...refused);
     await sent();
   };
 
-  const onsubmit = (/** @type {SubmitEvent} */ event) => {
-    event.preventDefault();
-    attempted([go], answer, "Sending …", store);
-  };
   const fields = h(
     "div.fields",
     field(cycles, "Duty cycles since new"),
@@ -87,6 +83,7 @@ export function inspectionForm(path, sent) {
     field(note, "Note"),
     field(photographs, "Photographs: PNG, JPEG or WebP"),
   );
-  const form = h("form", { onsubmit }, fields, answer, h("div.row.buttons", go));
-  return h("details.inspect", h("summary", "Add an inspection"), form);
+  const submit = () => attempted([go], answer, "Sending …", store);
+  const typed = form(submit, fields, answer, h("div.row.buttons", go));
+  return h("details.inspect", h("summary", "Add an inspection"), typed);
 }

@@ -30,8 +30,8 @@ export function importer(file, number, run) {
   /** @type {ReturnType<typeof setTimeout> | undefined} */
   let soon;
   // what was typed stays when the rest is drawn again
-  const rigName = h("input", { id: `rig-${number}`, autocomplete: "off", spellcheck: "false" });
-  const pattern = h("input", { id: `pattern-${number}`, autocomplete: "off" });
+  const rigName = h("input", { id: `rig-${number}`, spellcheck: "false" });
+  const pattern = h("input", { id: `pattern-${number}` });
   const lead = h("p.quiet", { role: "status" }, "Reading …");
   const content = h("div");
   const element = h("details.import", h("summary", "Columns, units, and what is fitted"), content);
@@ -173,7 +173,7 @@ export function importer(file, number, run) {
     });
     const marks = Object.entries({ "": "found", ",": "comma: 1.234,5", ".": "point: 1,234.5" });
     const sheets = ["", ...tables].map((name) => /** @type {[string, string]} */ ([name, name || "the only one"]));
-    const missing = h("input", { ...attributes("missing"), value: profile.missing ?? "", autocomplete: "off" });
+    const missing = h("input", { ...attributes("missing"), value: profile.missing ?? "" });
     return h(
       "div.fields",
       field(select(attributes("decimal"), marks, profile.decimal ?? ""), "Decimal mark"),

@@ -53,7 +53,7 @@ export const SECTIONS = [
  * @returns {Promise<string | null>}
  */
 export async function register(id, { similar = [], record = null, lead = "" } = {}) {
-  const attributes = { required: true, autocomplete: "off", autofocus: true, ...IDENTIFIER };
+  const attributes = { required: true, autofocus: true, ...IDENTIFIER };
   const name = h("input", { id: "new-id", value: id, ...attributes });
   /** @type {[string, HTMLInputElement][]} by their place in the record */
   const inputs = [];
@@ -98,7 +98,7 @@ function inputOf([path, , usual, attributes], record) {
   const own = path.split(".").reduce((value, name) => value?.[name], /** @type {any} */ (record));
   const kind =
     typeof usual === "string" ? { maxlength: 100 } : { type: "number", step: "any", min: 0, inputmode: "decimal" };
-  const all = { required: true, value: own ?? usual ?? "", autocomplete: "off", ...kind, ...attributes };
+  const all = { required: true, value: own ?? usual ?? "", ...kind, ...attributes };
   return h("input", { id: `new-${path.replace(".", "-")}`, ...all });
 }
 

@@ -3,7 +3,7 @@
 // name says), importer.js (how it is read), registration.js (a clutch that is not known yet) and receipt.js (what the service made of a run).
 
 import { clutchPath, Problem, read } from "../shared/api.js";
-import { answered, button, field, h } from "../shared/dom.js";
+import { answered, button, field, form, h } from "../shared/dom.js";
 import { attempted } from "../shared/problem_view.js";
 import { batchOf } from "./batch.js";
 import { IDENTIFIER, register } from "./registration.js";
@@ -22,21 +22,19 @@ export function sender(button, page) {
 function open(batch, page) {
   const { runs, wrong } = batch;
   const alone = runs.length === 1;
-  const typed = { required: true, list: "registered", autocomplete: "off", spellcheck: "false", ...IDENTIFIER };
-  const clutch = h("input", { id: "to", value: page.clutch ?? namedIn(batch), ...typed });
+  const naming = { required: true, list: "registered", spellcheck: "false", ...IDENTIFIER };
+  const clutch = h("input", { id: "to", value: page.clutch ?? namedIn(batch), ...naming });
   const suggestions = h("datalist", { id: "registered" });
   const answer = h("div.answer", { role: "status" });
   const go = h("button.main");
-  const onsubmit = async (/** @type {SubmitEvent} */ event) => {
-    event.preventDefault();
+  const submit = async () => {
     await attempted([go], answer, "", send);
     showGo();
   };
   const close = button("Close", () => dialog.close());
   const elements = runs.map((run) => run.element);
-  const form = h(
-    "form",
-    { onsubmit },
+  const typed = form(
+    submit,
     h("div.fields", field(clutch, "Clutch", suggestions)),
     wrong.length > 0 ? notRuns(wrong) : "",
     h("div.listed", elements),
@@ -44,7 +42,7 @@ function open(batch, page) {
     h("div.row.buttons", close, go),
   );
   const title = h("h2", { id: "sending-title" }, runs.length > 1 ? `Send ${runs.length} runs` : "Send a run");
-  const dialog = h("dialog", { "aria-labelledby": "sending-title" }, title, form);
+  const dialog = h("dialog", { "aria-labelledby": "sending-title" }, title, typed);
 
   /** The runs that are not stored yet. */
   const left = () => runs.filter((run) => run.progress !== "stored");
@@ -72,7 +70,7 @@ function open(batch, page) {
     for (const { reading } of runs) await reading?.look();
     const decided = runs.length > 0 && wrong.length === 0 && runs.every(({ reading }) => reading?.decided());
     const untouched = !closed() && runs.every(({ progress }) => progress === "waiting");
-    if (decided && untouched && clutch.value === page.clutch) form.requestSubmit();
+    if (decided && untouched && clutch.value === page.clutch) typed.requestSubmit();
   }
 
   function showGo() {
@@ -127,7 +125,7 @@ function open(batch, page) {
   showGo();
   void answered(dialog, () => null);
   // the field that the reader has to fill in first, else the button that sends
-  const fields = /** @type {HTMLInputElement[]} */ ([...form.querySelectorAll("input[required], select[required]")]);
+  const fields = /** @type {HTMLInputElement[]} */ ([...typed.querySelectorAll("input[required], select[required]")]);
   (fields.find((input) => input.value === "") ?? go).focus();
   look();
 }

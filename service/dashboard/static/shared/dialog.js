@@ -1,6 +1,6 @@
 // Questions in a dialog: each has a form that is sent, or is left.
 
-import { answered, button, h } from "./dom.js";
+import { answered, button, form, h } from "./dom.js";
 import { attempted } from "./problem_view.js";
 
 /** @import { Content } from "./dom.js" */
@@ -31,19 +31,14 @@ export function asked({ title, lines = [], fields = [], action, leave = "Cancel"
   if (leave === null) dialog.addEventListener("cancel", (event) => event.preventDefault());
   /** @type {Result | null} */
   let result = null;
-  const submit = async (/** @type {SubmitEvent} */ event) => {
-    event.preventDefault();
-    const work = async () => {
-      result = await send();
-      dialog.close();
-    };
-    await attempted([go], answer, "Computing …", work, lead ?? "Nothing was changed. ");
+  const work = async () => {
+    result = await send();
+    dialog.close();
   };
+  const submit = () => attempted([go], answer, "Computing …", work, lead ?? "Nothing was changed. ");
   const cancel = leave !== null && button(leave, () => dialog.close());
-  const form = h("div.fields", fields);
   const buttons = h("div.row.buttons", cancel, go);
-  dialog.append(h("h2", title), h("div", ...lines));
-  dialog.append(h("form", { onsubmit: submit }, form, answer, buttons));
+  dialog.append(h("h2", title), h("div", ...lines), form(submit, h("div.fields", fields), answer, buttons));
   return answered(dialog, () => result);
 }
 

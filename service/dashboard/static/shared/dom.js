@@ -106,6 +106,15 @@ export const quiet = (...content) => h("p.quiet", ...content);
  */
 export const field = (input, label, more = null) => h("div", h("label", { for: input.id }, label), input, more);
 
+/** @type {(submit: () => unknown, ...content: Content[]) => HTMLFormElement} its values are not kept by the browser */
+export function form(submit, ...content) {
+  const onsubmit = (/** @type {SubmitEvent} */ event) => {
+    event.preventDefault();
+    submit();
+  };
+  return h("form", { autocomplete: "off", onsubmit }, ...content);
+}
+
 /** @type {(letter: string, index: string) => HTMLElement} a letter with its index */
 export const symbol = (letter, index) => h("span", letter, h("sub", index));
 

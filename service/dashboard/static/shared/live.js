@@ -128,7 +128,7 @@ const ABOUT =
 
 /** @type {(detail: string) => Promise<unknown>} resolves when a key has been given; `detail`: why it is asked for */
 function askForKey(detail) {
-  const input = h("input", { id: "key", type: "password", autocomplete: "off", required: true, spellcheck: "false" });
+  const input = h("input", { id: "key", type: "password", required: true, spellcheck: "false" });
   const kept = quiet("It is kept in this tab until you close it, and sent to this service only.");
   return asked({
     title: "This service asks for a key",

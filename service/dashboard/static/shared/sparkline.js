@@ -59,13 +59,13 @@ export function intervalBar(quantiles, scale) {
   );
 }
 
-/** @type {(share: number, look: string) => SVGSVGElement} a share from 0 to 1 as a bar; `look`: its classes */
+/** @type {(share: number, look: Record<string, string | Record<string, string>>) => SVGSVGElement} from 0 to 1, as a bar */
 export function shareBar(share, look) {
   const width = Math.max(share > 0 ? 3 : 0, 60 * share).toFixed(1);
   const box = { preserveAspectRatio: "none", viewBox: "0 0 60 8", width: 60, height: 8 };
   return svg(
     "svg",
-    { class: look, ...box, "aria-hidden": "true" },
+    { ...look, ...box, "aria-hidden": "true" },
     svg("rect.axis", { width: 60, height: 8, rx: 4 }),
     svg("rect.fill", { width, height: 8, rx: 4 }),
   );

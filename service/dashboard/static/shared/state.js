@@ -22,6 +22,9 @@ export const VERDICTS = {
   insufficient_data: "Too little data",
 };
 
+/** @type {(name: StateName) => Record<string, string>} a state's colour, which the style sheet has under its name */
+export const colourOf = (name) => ({ color: `var(--${name})` });
+
 /** @type {(count: number) => string} how many runs of a clutch wait for someone to look at them */
 export const heldText = (count) => `${count} ${count === 1 ? "run" : "runs"} held`;
 
@@ -56,7 +59,7 @@ const SHAPES = {
 export function stateIcon(name) {
   return svg(
     "svg",
-    { class: `icon state-${name}`, viewBox: "0 0 20 20", width: 20, height: 20, "aria-hidden": "true" },
+    { class: "icon", style: colourOf(name), viewBox: "0 0 20 20", width: 20, height: 20, "aria-hidden": "true" },
     SHAPES[name].map(([shape, attributes]) => svg(shape, attributes)),
   );
 }
