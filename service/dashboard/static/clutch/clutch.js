@@ -8,7 +8,7 @@ import { painted } from "../charts/plotting.js";
 import { engagementsTab } from "../engagements/engagements.js";
 import { sender } from "../sending/sending.js";
 import { Problem, read } from "../shared/api.js";
-import { button, byId, h, showTab, within } from "../shared/dom.js";
+import { button, byId, h, showTab } from "../shared/dom.js";
 import { Live } from "../shared/live.js";
 import { placeUnits } from "../shared/units.js";
 import { askArchive, askEnd, askTakeBack, showDone } from "./changes.js";
@@ -46,11 +46,11 @@ const page = { reader, done };
 /** @type {Record<string, (place: HTMLElement) => Tab>} */
 const TABS = {
   overview: (place) => overviewTab(place, page),
-  diagnosis: () => diagnosisTab(within("diagnosis", ".body"), reader, refresh),
+  diagnosis: () => diagnosisTab(byId("diagnosis-body"), reader, refresh),
   curves: () => curvesTab(page),
   loops: () => loopsTab(page),
-  engagements: () => engagementsTab(within("engagements", ".charts"), reader),
-  runs: () => runsTab(within("runs", ".body"), page),
+  engagements: () => engagementsTab(byId("engagements-charts"), reader),
+  runs: () => runsTab(byId("runs-body"), page),
   history: () => historyTab(page),
   alarms: (place) => {
     const show = alarms(place, ID);

@@ -5,7 +5,7 @@ import { landscape, parameter, PARAMETER_NAMES, PARAMETERS } from "../charts/par
 import { flat, pressuresOf, spread, surface } from "../charts/stribeck.js";
 import { levelOptions, optionsOf, stateOptions, usual } from "../quantities/names.js";
 import { pressureLaw } from "../quantities/pressure_laws.js";
-import { within } from "../shared/dom.js";
+import { byId } from "../shared/dom.js";
 
 /** @import { ParameterName } from "../charts/parameters.js" */
 /** @import { Depth } from "../charts/stribeck.js" */
@@ -41,9 +41,9 @@ export function curvesTab({ reader }) {
   const overAll = { id: "landscape", title: "A parameter over cycles and pressure", spatial: true, wide: true };
   const whole = new Chart({ name, ...overAll, height: 440 });
   const law = new Chart({ name, id: "pressure-law", title: "A parameter over pressure", height: 360 });
-  within("stribeck", ".charts").append(curves.element, spatial.element);
+  byId("stribeck-charts").append(curves.element, spatial.element);
   const below = [...parameters.map(({ chart }) => chart), whole, law];
-  within("parameters", ".charts").append(...below.map(({ element }) => element));
+  byId("parameters-charts").append(...below.map(({ element }) => element));
   /** @type {{ tests: StribeckItem[], items: DegradationItem[], events: Receipt[] }} */
   let answers = { tests: [], items: [], events: [] };
   /** @type {Chosen} */

@@ -5,7 +5,7 @@ import { Chart } from "../charts/chart.js";
 import { remainingCycles } from "../charts/life.js";
 import { inspections } from "../inspections/inspections.js";
 import { clutchPath, readAll } from "../shared/api.js";
-import { button, h, quiet, scrolling, table, within } from "../shared/dom.js";
+import { button, byId, h, quiet, scrolling, table } from "../shared/dom.js";
 import { files } from "../shared/files.js";
 import { fixed, moment, words } from "../shared/format.js";
 import { askInspection } from "./changes.js";
@@ -93,9 +93,9 @@ function shown(value) {
 export function historyTab({ reader, done }) {
   const { name } = reader;
   const predicted = new Chart({ name, id: "predicted", title: "Remaining cycles, as predicted", wide: true });
-  within("predictions", ".charts").append(predicted.element);
-  const inspected = inspections(within("inspections", ".body"), reader, (one) => done(askInspection(one)));
-  const showChanges = auditTrail(within("changes", ".body"), reader.id);
+  byId("predictions-charts").append(predicted.element);
+  const inspected = inspections(byId("inspections-body"), reader, (one) => done(askInspection(one)));
+  const showChanges = auditTrail(byId("changes-body"), reader.id);
   /** Inspections come without a change of the clutch. */
   const poll = async () => inspected(await reader.events());
   const showPredictions = async () => predicted.show(remainingCycles(await reader.forecast()));

@@ -8,7 +8,7 @@ import { LAG_NAMES, lagOverCycles, lagOverPressure } from "../quantities/lag.js"
 import { lazy } from "../quantities/lazy.js";
 import { levelOptions, levelsOf, optionsOf, QUANTITIES, stateOptions, usual } from "../quantities/names.js";
 import { read } from "../shared/api.js";
-import { byId, within } from "../shared/dom.js";
+import { byId } from "../shared/dom.js";
 import { BY } from "./curves.js";
 
 /** @import { LagName } from "../quantities/lag.js" */
@@ -24,8 +24,8 @@ export function loopsTab({ reader }) {
   const curves = new Chart({ name, id: "loop-curves", title: "Loops: torque over speed", wide: true, height: 420 });
   const overCycles = new Chart({ name, id: "lag-cycles", title: "Lag over cycles", height: 400 });
   const overPressure = new Chart({ name, id: "lag-pressure", title: "Lag over pressure", height: 400 });
-  within("loops", ".charts").append(curves.element);
-  within("lag", ".charts").append(overCycles.element, overPressure.element);
+  byId("loops-charts").append(curves.element);
+  byId("lag-charts").append(overCycles.element, overPressure.element);
   /** @type {{ loops: LoopItem[], tests: StribeckItem[], events: Receipt[] }} */
   let answers = { loops: [], tests: [], events: [] };
   /** @type {DegradationItem[] | null} null: not read yet */

@@ -23,11 +23,8 @@ export function runsTab(place, { reader, done }) {
   const open = new Set();
   let revealed = "";
 
-  /** @param {string} runId */
-  function summaryOf(runId) {
-    const details = [...place.querySelectorAll("details")].find((element) => element.dataset.run === runId);
-    return details?.querySelector("summary");
-  }
+  /** @type {(runId: string) => HTMLElement | null} */
+  const summaryOf = (runId) => place.querySelector(`[data-run="${CSS.escape(runId)}"] > summary`);
 
   /** @type {(runId: string) => void} show a run, opened */
   function reveal(runId) {

@@ -70,7 +70,7 @@ export class Rows {
   restart() {
     this.offset = 0;
     this.total = 0;
-    if (scrollY > this.top()) scrollTo(0, this.top());
+    if (this.element.getBoundingClientRect().top < 0) this.element.scrollIntoView();
   }
 
   /**
@@ -130,16 +130,11 @@ export class Rows {
    */
   arrange(order) {
     const focused = document.activeElement;
-    let next = this.body.firstElementChild;
-    for (const element of order) {
-      if (element === next) next = next.nextElementSibling;
-      else this.body.insertBefore(element, next);
+    const { children } = this.body;
+    for (const [index, element] of order.entries()) {
+      if (children[index] !== element) this.body.insertBefore(element, children[index] ?? null);
     }
-    while (next !== null) {
-      const gone = next;
-      next = next.nextElementSibling;
-      gone.remove();
-    }
+    while (children.length > order.length) children[order.length].remove();
     if (focused instanceof HTMLElement && this.body.contains(focused)) focused.focus({ preventScroll: true });
   }
 
@@ -168,11 +163,6 @@ export class Rows {
   /** @param {number} index in the list */
   topOf(index) {
     return this.body.children[index - this.offset]?.getBoundingClientRect().top ?? null;
-  }
-
-  /** Where the table begins on the page, px. */
-  top() {
-    return this.element.isConnected ? this.element.getBoundingClientRect().top + scrollY : 0;
   }
 
   measure() {

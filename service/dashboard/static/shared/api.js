@@ -96,17 +96,13 @@ export async function read(path) {
   const headers = { Prefer: "wait=60" }; // a page that shows the clutch as it is waits for the newest answer
   if (before?.tag) headers["If-None-Match"] = before.tag;
   const answer = await request(path, { headers });
-  if (answer.status === 304 && before) {
-    await answer.arrayBuffer(); // an answer that is not read to its end keeps its connection busy
-    answers.delete(path);
-    answers.set(path, before);
-    return { body: before.body, changed: false };
-  }
-  const body = await answer.json();
+  const text = await answer.text(); // to its end, though it be empty: otherwise it keeps its connection busy
+  const changed = answer.status !== 304 || before === undefined;
+  const now = changed ? { tag: answer.headers.get("ETag"), body: JSON.parse(text) } : before;
   answers.delete(path);
-  answers.set(path, { tag: answer.headers.get("ETag"), body });
+  answers.set(path, now);
   if (answers.size > MOST_KEPT) answers.delete([...answers.keys()][0]);
-  return { body, changed: true };
+  return { body: now.body, changed };
 }
 
 /**

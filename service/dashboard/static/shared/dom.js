@@ -67,13 +67,6 @@ export function byId(id) {
   return element;
 }
 
-/** @type {(id: string, selector: string) => HTMLElement} the place of a section's content */
-export function within(id, selector) {
-  const element = byId(id).querySelector(selector);
-  if (!(element instanceof HTMLElement)) throw new Error(`the page has no element #${id} ${selector}`);
-  return element;
-}
-
 /** @type {(names: string[], name: string) => void} of the page's tabs the one of that name in sight, its link marked */
 export function showTab(names, name) {
   for (const key of names) byId(`tab-${key}`).hidden = key !== name;

@@ -66,15 +66,9 @@ export class Live {
       this.asOf = new Date();
     } catch (error) {
       this.failures += 1;
-      if (!(error instanceof Problem)) {
-        // the page's own mistake, not the service's: shown on the page, and tried again as after any error
-        const message = error instanceof Error ? error.message : String(error);
-        this.problem = new Problem(-1, { title: `The page could not show the answer: ${message}` });
-        this.running = false;
-        this.plan();
-        throw error;
-      }
-      this.problem = error;
+      const own = !(error instanceof Problem); // the page's mistake, not the service's: tried again as after any error
+      this.problem = own ? new Problem(-1, { title: `The page could not show the answer: ${error}` }) : error;
+      if (own) reportError(error);
     }
     this.running = false;
     if (this.again) {
