@@ -2,7 +2,7 @@
 // chart; until someone points at it, and where the plotting library does not load, its drawing is a light one), then life.js:
 // like fan.js, loops.js, parameters.js and stribeck.js it says what its charts show; the others say how a chart is drawn.
 
-import { button, h, quiet, save, scrolling, select, symbol, table } from "../shared/dom.js";
+import { button, h, quiet, save, scrolling, select, symbol, table, watch } from "../shared/dom.js";
 import { saveTable } from "../shared/files.js";
 import { settled } from "./frame.js";
 import { base, config } from "./layout.js";
@@ -25,17 +25,6 @@ const MOST_ROWS = 400;
 const NO_WEBGL = "This browser does not draw in 3D (WebGL is off). The table holds the numbers.";
 const NO_LIBRARY = "The plotting library did not load. The table holds the numbers.";
 
-/** @type {WeakMap<Element, Chart>} */
-const charts = new WeakMap();
-const visibility = new IntersectionObserver(
-  (entries) => {
-    for (const { target, isIntersecting } of entries) charts.get(target)?.near(isIntersecting);
-  },
-  { rootMargin: "400px" },
-);
-const resizing = new ResizeObserver((entries) => {
-  for (const { target } of entries) charts.get(target)?.resized();
-});
 /** @param {PointerEvent} event of a finger, it may be about to scroll: a tap is a click */
 const pointed = (event) => event.pointerType !== "touch" && want();
 
@@ -76,9 +65,8 @@ export class Chart {
       this.plot,
       this.details,
     );
-    for (const element of [this.element, this.plot]) charts.set(element, this);
-    visibility.observe(this.element);
-    resizing.observe(this.plot);
+    watch(this.element, 400, (near) => this.near(near));
+    new ResizeObserver(() => this.resized()).observe(this.plot);
     document.addEventListener("themechange", () => this.redraw());
   }
 

@@ -46,20 +46,6 @@ export function band(name, lower, upper, c, color = c.accent) {
   ];
 }
 
-/**
- * Bars that span the 90 % interval.
- * @param {(number | null)[]} sds standard deviations; null draws none
- * @param {string} color
- * @param {{ thickness: number, width: number }} look
- * @returns {ErrorBars}
- */
-export const errorBars = (sds, color, look) => ({
-  type: "data",
-  array: sds.map((sd) => HALF_OF_90 * (sd ?? 0)),
-  color,
-  ...look,
-});
-
 /** @type {(name: string, at: Places, line: Line, text: string, more?: Partial<PlainTrace>) => PlainTrace} */
 export const lineOf = (name, at, line, text, more = {}) => ({
   name,
@@ -83,20 +69,19 @@ export function tracked({ cycles: x, lower, median, upper }, { name, band: edges
   ];
 }
 
+/** @typedef {{ color: string, text: string, size?: number, thickness?: number, bars?: number }} PointLook `text`: under the pointer */
+
 /**
- * Points with error bars, over cycles or what stands in their place.
- * @param {string} name
- * @param {Measured} measured
- * @param {{ color: string, text: string, size?: number, thickness?: number }} look `text` is shown under the pointer
- * @returns {PlainTrace}
+ * Points with bars that span the 90 % interval, over cycles or what stands in their place; a deviation that is null has none.
+ * @type {(name: string, measured: { cycles: number[], value: number[], sd: (number | null)[] }, look: PointLook) => PlainTrace}
  */
-export const measuredPoints = (name, { cycles: x, value: y, sd }, { color, text, size = 6, thickness = 1.1 }) => ({
+export const measuredPoints = (name, measured, { color, text, size = 6, thickness = 1.1, bars = 3 }) => ({
   name,
   mode: "markers",
-  x,
-  y,
+  x: measured.cycles,
+  y: measured.value,
   marker: { color, size },
-  error_y: errorBars(sd, color, { thickness, width: 3 }),
+  error_y: { type: "data", array: measured.sd.map((sd) => HALF_OF_90 * (sd ?? 0)), color, thickness, width: bars },
   hovertemplate: `${text}<extra></extra>`,
 });
 
@@ -127,20 +112,12 @@ export const spatialPoints = (at, size, color, text) => ({
  * A line with points and error bars.
  * @type {(name: string, values: { x: number, value: number, sd: number | null }[], look: Look, color: string) => PlainTrace}
  */
-export const measuredLine = (name, values, { size, bars, text }, color) => ({
-  name,
-  mode: "lines+markers",
-  x: values.map(({ x }) => x),
-  y: values.map(({ value }) => value),
-  line: { color, width: 1.4 },
-  marker: { color, size },
-  error_y: errorBars(
-    values.map(({ sd }) => sd),
-    color,
-    { thickness: 1, width: bars },
-  ),
-  hovertemplate: `${text}<extra></extra>`,
-});
+export function measuredLine(name, values, look, color) {
+  const [cycles, value] = [values.map(({ x }) => x), values.map((each) => each.value)];
+  const measured = { cycles, value, sd: values.map(({ sd }) => sd) };
+  const points = measuredPoints(name, measured, { color, thickness: 1, ...look });
+  return { ...points, mode: "lines+markers", line: { color, width: 1.4 } };
+}
 
 /**
  * A line with points and error bars for each pressure, over cycles.
@@ -148,13 +125,13 @@ export const measuredLine = (name, values, { size, bars, text }, color) => ({
  * @param {Look} look
  * @param {Colours} c
  */
-export function linesByPressure(values, { size, bars, text }, c) {
+export function linesByPressure(values, { text, ...look }, c) {
   const pressures = distinct(values.map(({ pressure }) => pressure));
   return pressures.map((level, index) => {
     const own = values.filter(({ pressure }) => pressure === level);
     const points = own.map(({ cycles, value, sd }) => ({ x: cycles, value, sd }));
     const name = pressureText(level);
     const under = `%{x:,.0f} cycles, ${name}<br>${text}`;
-    return measuredLine(name, points, { size, bars, text: under }, pressureRampOf(c, index, pressures.length));
+    return measuredLine(name, points, { ...look, text: under }, pressureRampOf(c, index, pressures.length));
   });
 }

@@ -207,7 +207,7 @@ function drawChips(totals) {
   const names = /** @type {StateName[]} */ (Object.keys(STATES));
   const chips = [
     chip(null, totals.all === 1 ? "clutch" : "clutches"),
-    ...names.map((name) => chip(name, STATES[name].word.toLowerCase())),
+    ...names.map((name) => chip(name, STATES[name].toLowerCase())),
     chip("held", "with held runs"),
   ];
   byId("chips").replaceChildren(...chips.filter((element) => element !== null));

@@ -30,7 +30,7 @@ export function row(clutch, { scale, group, chosen, choose }) {
   const box = h("input", { type: "checkbox", checked: chosen, "aria-label": `Choose ${clutch.clutch_id}` });
   box.addEventListener("change", () => choose(box.checked));
   const address = `/clutches/${encodeURIComponent(clutch.clutch_id)}`;
-  const label = h("span", STATES[state.name].word, state.name !== "normal" && small(state.why));
+  const label = h("span", STATES[state.name], state.name !== "normal" && small(state.why));
   return h(
     "tr",
     { role: "row", "data-clutch": clutch.clutch_id, class: group === null ? null : "begins" },

@@ -3,7 +3,7 @@
 // keeps a drawing as small as its thumbnail, and the whole of one while it is open.
 
 import { readFile } from "../shared/api.js";
-import { answered, button, h } from "../shared/dom.js";
+import { answered, button, h, watch } from "../shared/dom.js";
 import { fixed } from "../shared/format.js";
 
 /** @typedef {{ path: string, text: string }} Shown a photograph's address, and what it shows in words */
@@ -32,18 +32,6 @@ export function gallery(base) {
   const drawings = new Map();
   // what is being read and drawn: a photograph at a time, as one of 24 megapixels takes 100 MB while it is drawn
   let queue = Promise.resolve();
-  /** @type {Map<Element, Shown>} */
-  const waiting = new Map();
-  const visibility = new IntersectionObserver(
-    (entries) => {
-      for (const { target, isIntersecting } of entries) {
-        if (!isIntersecting) continue;
-        visibility.unobserve(target);
-        queue = queue.then(() => draw(target));
-      }
-    },
-    { rootMargin: "300px" },
-  );
 
   /** @param {InspectionOut} inspection */
   function state({ inspection_id: id, cycles, lining, photographs }) {
@@ -60,18 +48,15 @@ export function gallery(base) {
     const drawing = drawings.get(photograph.path);
     const attributes = { class: "thumbnail", "aria-label": `${photograph.text}: show it larger` };
     const made = button(drawing, () => open(photograph), attributes);
-    if (drawing === undefined) {
-      waiting.set(made, photograph);
-      visibility.observe(made);
-    }
+    watch(made, 300, (near) => {
+      if (near) queue = queue.then(() => draw(made, photograph.path));
+    });
     return made;
   }
 
-  /** @param {Element} place */
-  async function draw(place) {
-    const photograph = waiting.get(place); // none where it is shown no more
-    if (photograph === undefined) return;
-    const { path } = photograph;
+  /** @type {(place: HTMLElement, path: string) => Promise<void>} once, and where it is shown still */
+  async function draw(place, path) {
+    if (place.hasChildNodes() || !place.isConnected) return;
     try {
       const drawing = drawings.get(path) ?? (await drawn(await readFile(path)));
       place.replaceChildren(drawing);
@@ -84,8 +69,6 @@ export function gallery(base) {
   return {
     element,
     show: (/** @type {InspectionOut[]} */ inspections) => {
-      visibility.disconnect();
-      waiting.clear();
       element.replaceChildren(...inspections.filter(({ photographs }) => photographs.length > 0).map(state));
       for (const [path, drawing] of drawings) if (!drawing.isConnected) drawings.delete(path);
     },

@@ -1,6 +1,7 @@
 // An answer that takes the service seconds: read when its section is looked at, and again only when another one is wanted.
 
 import { Problem } from "../shared/api.js";
+import { watch } from "../shared/dom.js";
 
 /** @import { Chart } from "../charts/chart.js" */
 
@@ -36,14 +37,10 @@ export function lazy(place, charts, read) {
     }
     check(); // another answer may be wanted by now
   }
-  const observer = new IntersectionObserver(
-    (entries) => {
-      near = entries.some(({ isIntersecting }) => isIntersecting);
-      check();
-    },
-    { rootMargin: "200px" },
-  );
-  observer.observe(place);
+  watch(place, 200, (now) => {
+    near = now;
+    check();
+  });
   return (/** @type {string} */ key) => {
     wanted = key;
     check();

@@ -17,23 +17,21 @@ const COLUMNS = [KIND, column("pressure, bar", 2), ...intervalColumns("value", 4
  * @param {number} pressure
  */
 export function lawAt(law, pressure) {
-  const { value, gradient } = "decay_bar" in law ? falling(law, pressure) : linear(law, pressure);
+  let value;
+  let gradient;
+  if ("decay_bar" in law) {
+    const share = Math.exp(-pressure / law.decay_bar);
+    value = law.asymptote + law.excess * share;
+    gradient = [1, share, (law.excess * share * pressure) / law.decay_bar ** 2];
+  } else {
+    value = law.intercept + law.slope_per_bar * pressure;
+    gradient = [1, pressure];
+  }
   const variance = gradient.reduce(
     (sum, slope, row) => sum + gradient.reduce((part, other, at) => part + slope * law.covariance[row][at] * other, 0),
     0,
   );
   return { pressure, value, sd: Math.sqrt(Math.max(0, variance)) };
-}
-
-/** @type {(law: LinearLaw, pressure: number) => { value: number, gradient: number[] }} */
-const linear = ({ intercept, slope_per_bar: slope }, pressure) => {
-  return { value: intercept + slope * pressure, gradient: [1, pressure] };
-};
-
-/** @type {(law: AsymptoticLaw, pressure: number) => { value: number, gradient: number[] }} */
-function falling({ asymptote, excess, decay_bar: decay }, pressure) {
-  const share = Math.exp(-pressure / decay);
-  return { value: asymptote + excess * share, gradient: [1, share, (excess * share * pressure) / decay ** 2] };
 }
 
 /** @type {(answers: { test: StribeckItem | undefined, name: ParameterName }) => Spec} */

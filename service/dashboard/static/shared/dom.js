@@ -67,6 +67,14 @@ export function byId(id) {
   return element;
 }
 
+/** @type {(element: Element, margin: number, told: (near: boolean) => unknown) => void} by less than `margin` px to the screen */
+export function watch(element, margin, told) {
+  const observer = new IntersectionObserver((entries) => told(entries[entries.length - 1].isIntersecting), {
+    rootMargin: `${margin}px`,
+  });
+  observer.observe(element);
+}
+
 /** @type {(names: string[], name: string) => void} of the page's tabs the one of that name in sight, its link marked */
 export function showTab(names, name) {
   for (const key of names) byId(`tab-${key}`).hidden = key !== name;
