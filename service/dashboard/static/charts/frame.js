@@ -118,7 +118,9 @@ export function settled({ data, layout }, { width, height }) {
   const widest = Math.max(0, ...yTicks.map(({ text }) => widthOf(text, font)));
   const l = Math.round(Math.max(56, widest + 1.3 * font.size + 24));
   const xTicks = ticksOf(x.range, width - l - margin.r, 80);
-  const r = Math.max(margin.r, overhang(xTicks.at(-1), x.range, width - l - margin.r, font));
+  const [last, [from, to]] = [xTicks.at(-1), x.range];
+  const after = last ? ((width - l - margin.r) * (to - last.at)) / (to - from) : 0;
+  const r = Math.max(margin.r, Math.ceil(0.5 * widthOf(last?.text ?? "", font) - after) + 3); // for its last value
   return {
     data,
     layout: {
@@ -132,12 +134,4 @@ export function settled({ data, layout }, { width, height }) {
     ticks: { x: xTicks, y: yTicks },
     legend: { entries: legend.entries, top: height - b + below },
   };
-}
-
-/**
- * How far the last value of the abscissa reaches past the axes, px; `inside`: width of the axes, px.
- * @type {(last: { at: number, text: string } | undefined, range: Span, inside: number, font: TextFont) => number}
- */
-function overhang(last, [from, to], inside, font) {
-  return last ? Math.ceil(0.5 * widthOf(last.text, font) - (inside * (to - last.at)) / (to - from)) + 3 : 0;
 }

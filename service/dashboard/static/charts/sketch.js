@@ -111,9 +111,9 @@ function label(text, attributes) {
 const DASHES = { dash: 3, dot: 1 };
 
 /** @param {Line} line */
-function dashes({ dash, width = 2 }) {
+function strokeOf({ color, dash, width = 2 }) {
   const length = dash && DASHES[dash] * Math.max(3, width);
-  return length ? `${length} ${length}` : null;
+  return { stroke: color, "stroke-width": width, "stroke-dasharray": length ? `${length} ${length}` : null };
 }
 
 /** @type {(xs: (number | null)[], ys: (number | null)[]) => string} the pen lifted where a value is missing */
@@ -162,13 +162,6 @@ function drawn(trace, before, x, y) {
   }
   return parts;
 }
-
-/** @param {Line} line */
-const strokeOf = (line) => ({
-  stroke: line.color,
-  "stroke-width": line.width ?? 2,
-  "stroke-dasharray": dashes(line),
-});
 
 /** The plotting library's own size of points, px, where a trace names none. */
 const POINT = 6;

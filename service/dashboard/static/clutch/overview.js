@@ -125,14 +125,18 @@ function tiles(clutch, life) {
   const look = { class: "health", style: colourOf(clutch.state.name) };
   return [
     tile("Health", percent(health), health === null ? null : shareBar(health, look)),
-    tile(predicts(life) ? "Safe for, cycles (95 %)" : "Remaining cycles", remaining(life), small(remainingNotes(life))),
-    tile("Mean COF", cof, small(`${deviation ? `± ${deviation}; ` : ""}${place}`)),
-    tile("Duty cycles so far", fixed(life.as_of_cycles), small(used)),
-    tile("How it ages", course ? COURSES[course.name] : "not known yet", small(sure)),
+    tile(
+      predicts(life) ? "Safe for, cycles (95 %)" : "Remaining cycles",
+      remaining(life),
+      h("small", remainingNotes(life)),
+    ),
+    tile("Mean COF", cof, h("small", `${deviation ? `± ${deviation}; ` : ""}${place}`)),
+    tile("Duty cycles so far", fixed(life.as_of_cycles), h("small", used)),
+    tile("How it ages", course ? COURSES[course.name] : "not known yet", h("small", sure)),
     tile(
       "Correction",
       model.effects.length > 0 ? `For ${model.effects.map((name) => name.replaceAll("_", " ")).join(", ")}` : "None",
-      small(model.effects.length > 0 ? "by the adopted diagnosis" : "no diagnosis is adopted"),
+      h("small", model.effects.length > 0 ? "by the adopted diagnosis" : "no diagnosis is adopted"),
     ),
   ];
 }
@@ -158,9 +162,6 @@ function remainingNotes(life) {
     .filter((note) => note !== null)
     .join("; ");
 }
-
-/** @param {string} text */
-const small = (text) => h("small", text);
 
 /** @type {(name: string, value: string, more: Content) => HTMLElement} */
 const tile = (name, value, more) => h("div.tile", h("dt", name), h("dd", h("span.big", value), more));

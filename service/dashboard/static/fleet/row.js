@@ -26,11 +26,11 @@ export const COLUMNS = [
  * @param {{ scale: number, group: string | null, chosen: boolean, choose: (chosen: boolean) => void }} options
  */
 export function row(clutch, { scale, group, chosen, choose }) {
-  const { summary, state } = clutch;
+  const { summary, state, held } = clutch;
   const box = h("input", { type: "checkbox", checked: chosen, "aria-label": `Choose ${clutch.clutch_id}` });
   box.addEventListener("change", () => choose(box.checked));
   const address = `/clutches/${encodeURIComponent(clutch.clutch_id)}`;
-  const label = h("span", STATES[state.name], state.name !== "normal" && small(state.why));
+  const label = h("span", STATES[state.name], state.name !== "normal" && h("small", state.why));
   return h(
     "tr",
     { role: "row", "data-clutch": clutch.clutch_id, class: group === null ? null : "begins" },
@@ -42,12 +42,12 @@ export function row(clutch, { scale, group, chosen, choose }) {
       group !== null && h("span.group", group),
       h("a", { href: address }, clutch.clutch_id),
       clutch.origin === "simulated" && h("span.tag", "simulated"),
-      small(`${clutch.friction_material} on ${clutch.reaction_plate}`),
+      h("small", `${clutch.friction_material} on ${clutch.reaction_plate}`),
     ),
     cell("Health", ...health(summary, state.name)),
     cell("Remaining", ...remaining(summary, state.name, scale)),
     cell("Mean COF", ...meanCof(clutch)),
-    cell("Last run", ...lastRun(clutch), held(clutch, address)),
+    cell("Last run", ...lastRun(clutch), held > 0 && h("a", { href: address, class: "mark-held" }, heldText(held))),
     cell("Diagnosis", ...diagnosis(clutch, address)),
   );
 }
@@ -59,17 +59,12 @@ export const kindOf = ({ friction_material: material, reaction_plate: plate, flu
 /** @type {(name: string, ...content: Content[]) => HTMLElement} */
 const cell = (name, ...content) => h("td", { role: "cell", "data-label": name }, ...content);
 
-/** @param {string} text */
-const number = (text) => h("span.number", text);
-/** @param {string} text */
-const small = (text) => h("small", text);
-
 /** @type {(summary: ClutchSummary | null, state: StateName) => string[] | (HTMLElement | SVGSVGElement)[]} */
 function health(summary, state) {
   const value = summary?.current.health ?? null;
   return value === null
     ? ["–"]
-    : [number(percent(value)), shareBar(value, { class: "health", style: colourOf(state) })];
+    : [h("span.number", percent(value)), shareBar(value, { class: "health", style: colourOf(state) })];
 }
 
 /**
@@ -79,22 +74,22 @@ function health(summary, state) {
  * @param {number} scale
  */
 function remaining(summary, state, scale) {
-  if (summary === null) return ["–", small("after three tests")];
+  if (summary === null) return ["–", h("small", "after three tests")];
   const { ended } = summary;
   if (ended)
     return [
-      ended.reason === "worn" ? number("0") : "–",
-      state !== "failure" && small(`ended at ${fixed(ended.cycles)} cycles`),
+      ended.reason === "worn" ? h("span.number", "0") : "–",
+      state !== "failure" && h("small", `ended at ${fixed(ended.cycles)} cycles`),
     ];
-  if (summary.status === "insufficient_data") return ["–", small(atLeast(summary.at_least))];
-  if (summary.status === "reached") return [number("0"), small("reached")];
+  if (summary.status === "insufficient_data") return ["–", h("small", atLeast(summary.at_least))];
+  if (summary.status === "reached") return [h("span.number", "0"), h("small", "reached")];
   const { remaining_cycles: q, at_least: bound, held_runs: held } = summary;
   const lowered = held !== null && (bound ?? Infinity) < (q["0.05"] ?? Infinity);
   return [
-    number(atLeast(bound)),
-    lowered && small(`if the held ${held.count === 1 ? "run counts" : "runs count"}`),
+    h("span.number", atLeast(bound)),
+    lowered && h("small", `if the held ${held.count === 1 ? "run counts" : "runs count"}`),
     intervalBar(q, scale),
-    small(likely(q)),
+    h("small", likely(q)),
   ];
 }
 
@@ -108,8 +103,11 @@ function meanCof({ summary, recent, end_of_life: end }) {
     sparkline(recent?.mean_cof ?? [], threshold),
     h(
       "span.beside",
-      number(fixed(cof, 4)),
-      small(share === null ? `at ${fixed(summary?.current.measured_at_cycles)} cycles` : `${percent(share)} of new`),
+      h("span.number", fixed(cof, 4)),
+      h(
+        "small",
+        share === null ? `at ${fixed(summary?.current.measured_at_cycles)} cycles` : `${percent(share)} of new`,
+      ),
     ),
   ];
 }
@@ -122,13 +120,8 @@ function lastRun({ recent }) {
   const title = new Date(when).toLocaleString("en-GB");
   return [
     h("time", { datetime: at, title, "data-age": String(when) }, age(when)),
-    small(`${kindName(kind)} at ${cycles(count, 0, 20)} cycles`),
+    h("small", `${kindName(kind)} at ${cycles(count, 0, 20)} cycles`),
   ];
-}
-
-/** @type {(clutch: ClutchOut, address: string) => false | HTMLElement} */
-function held({ held: count }, address) {
-  return count > 0 && h("a", { href: address, class: "mark-held" }, heldText(count));
 }
 
 /** @type {(clutch: ClutchOut, address: string) => HTMLElement[]} */
@@ -139,6 +132,6 @@ function diagnosis({ diagnosis: latest }, address) {
   const remarks = [causes, latest.adopted && "adopted", latest.earlier_life && "before the rebuild"];
   return [
     h("a", { href: `${address}#/diagnosis` }, VERDICTS[verdict] ?? words(verdict)),
-    small(remarks.filter(Boolean).join(" · ")),
+    h("small", remarks.filter(Boolean).join(" · ")),
   ];
 }
