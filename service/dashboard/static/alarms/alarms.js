@@ -2,7 +2,7 @@
 // the API go in; lists, a form and tests come out, of all clutches or of one. Open this file first, then form.js (a rule as a sentence
 // and in a dialog).
 
-import { read, readAll, sendJson } from "../shared/api.js";
+import { read, readAll, send } from "../shared/api.js";
 import { button, h, quiet, scrolling, table } from "../shared/dom.js";
 import { rowFiles } from "../shared/files.js";
 import { moment } from "../shared/format.js";
@@ -44,7 +44,7 @@ export function alarms(place, clutchId) {
   /** @param {EventOut[]} raised */
   function drawEvents(raised) {
     const acknowledge = (/** @type {EventOut} */ { event_id: id }) =>
-      send("POST", `/v1/alarms/events/${id}/acknowledge`, { note: "" });
+      told("POST", `/v1/alarms/events/${id}/acknowledge`, { note: "" });
     const rows = raised.map((event) => [
       moment(event.raised_at),
       h("a", { href: `/clutches/${encodeURIComponent(event.clutch_id)}` }, event.clutch_id),
@@ -67,7 +67,7 @@ export function alarms(place, clutchId) {
     const rows = own.map((rule) => {
       const text = ruleText(rule);
       const path = `/v1/alarms/${rule.alarm_id}`;
-      const test = act("Test", async () => say(await send("POST", `${path}/test`, {})), text);
+      const test = act("Test", async () => say(await told("POST", `${path}/test`, {})), text);
       const change = act("Change …", () => changed(rule), text);
       return [
         [rule.name && h("b", `${rule.name}: `), text, !rule.enabled && h("span.tag", "off")],
@@ -76,7 +76,7 @@ export function alarms(place, clutchId) {
           "div.row.buttons.start",
           test,
           change,
-          act("Delete", () => send("DELETE", path), text),
+          act("Delete", () => told("DELETE", path), text),
         ),
       ];
     });
@@ -93,11 +93,11 @@ export function alarms(place, clutchId) {
       name || "–",
       url,
       of ?? "all clutches",
-      act("Delete", () => send("DELETE", `/v1/webhooks/${id}`), url),
+      act("Delete", () => told("DELETE", `/v1/webhooks/${id}`), url),
     ]);
     const add = async () => {
       const receiver = await askReceiver(clutchId);
-      if (receiver !== null) await send("POST", "/v1/webhooks", receiver);
+      if (receiver !== null) await told("POST", "/v1/webhooks", receiver);
     };
     const all = table("Receivers", ["Name", "Address", "Of", "Action"], rows);
     receivers.replaceChildren(
@@ -116,15 +116,15 @@ export function alarms(place, clutchId) {
   async function changed(rule) {
     const wanted = await askRule(rule, clutchId);
     if (wanted === null) return;
-    if (rule === null) await send("POST", "/v1/alarms", wanted);
-    else await send("PUT", `/v1/alarms/${rule.alarm_id}`, wanted);
+    if (rule === null) await told("POST", "/v1/alarms", wanted);
+    else await told("PUT", `/v1/alarms/${rule.alarm_id}`, wanted);
   }
 
   /** @type {(method: string, path: string, body?: object) => Promise<any>} null where it was refused, which is said */
-  async function send(method, path, body = {}) {
+  async function told(method, path, body = {}) {
     wrong.replaceChildren();
     try {
-      const answer = await sendJson(method, path, body);
+      const answer = await send(method, path, body);
       await show();
       return answer;
     } catch (problem) {

@@ -3,7 +3,7 @@
 // Nothing is ever deleted.
 
 import { doubtList } from "../sending/receipt.js";
-import { clutchPath, Problem, readAll, sendJson } from "../shared/api.js";
+import { clutchPath, Problem, readAll, send } from "../shared/api.js";
 import { asked } from "../shared/dialog.js";
 import { button, field, h } from "../shared/dom.js";
 import { fixed, kindName, words } from "../shared/format.js";
@@ -67,7 +67,7 @@ const pathOf = (run) => `${clutchPath(run.clutch_id)}/runs/${encodeURIComponent(
 /** @type {(address: string, value: object, method?: "POST" | "PATCH") => Promise<Receipt>} the answer, where it is a run's */
 async function post(address, value, method = "POST") {
   /** @type {{ body: Receipt }} */
-  const { body } = await sendJson(method, address, value);
+  const { body } = await send(method, address, value);
   return body;
 }
 

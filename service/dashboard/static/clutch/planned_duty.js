@@ -1,6 +1,6 @@
 // Planned duty: a form of blocks and a pace, and the remaining life under them. Nothing of it is stored.
 
-import { clutchPath, Problem, sendJson } from "../shared/api.js";
+import { clutchPath, Problem, send } from "../shared/api.js";
 import { button, field, form, h, quiet, scrolling, table } from "../shared/dom.js";
 import { fixed, NOT_A_NUMBER, numberOf, significant, sentence } from "../shared/format.js";
 import { attempted } from "../shared/problem_view.js";
@@ -99,7 +99,7 @@ export function plannedDuty(place, clutchId) {
     const programme = blocks.map(({ element }) => numbersIn(element));
     try {
       /** @type {{ body: PlannedLife }} */
-      const { body } = await sendJson("POST", address, { programme, ...numbersIn(pace), counted_by: countedBy });
+      const { body } = await send("POST", address, { programme, ...numbersIn(pace), counted_by: countedBy });
       answer.replaceChildren(...shown(body), other(body));
     } catch (problem) {
       const errors = problem instanceof Problem ? problem.errors : [];

@@ -2,7 +2,7 @@
 // Open this file first, then report.js (a report in words and tables) and charts.js (residuals and loops, before and after);
 // the first also shows remaining life before and after the model changes.
 
-import { read, sendJson } from "../shared/api.js";
+import { read, send } from "../shared/api.js";
 import { agreed } from "../shared/dialog.js";
 import { button, h, quiet } from "../shared/dom.js";
 import { words } from "../shared/format.js";
@@ -90,7 +90,7 @@ export function diagnosisTab(place, reader, changed) {
   function start() {
     return doing("The diagnosis runs; this takes seconds to minutes …", async () => {
       /** @type {{ status: number, body: DiagnosisOut, location: string | null }} */
-      const answer = await sendJson("POST", path, { adopt: false }, { Prefer: "wait=20" });
+      const answer = await send("POST", path, { adopt: false }, { Prefer: "wait=20" });
       const { status: code, body, location } = answer;
       draw(code === 202 ? await finished(location ?? `${path}/${body.diagnosis_id}`) : body);
     });
@@ -132,7 +132,7 @@ export function diagnosisTab(place, reader, changed) {
     doing(
       under,
       async () => {
-        await sendJson("PUT", `${reader.path}/model`, { diagnosis_id: id });
+        await send("PUT", `${reader.path}/model`, { diagnosis_id: id });
         await changed();
         if (latest) draw(await report(latest.diagnosis_id));
       },

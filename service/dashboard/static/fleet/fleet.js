@@ -5,7 +5,7 @@
 import { alarms } from "../alarms/alarms.js";
 import { register } from "../sending/registration.js";
 import { sender } from "../sending/sending.js";
-import { at, clutchPath, read, sendJson } from "../shared/api.js";
+import { at, clutchPath, read, send } from "../shared/api.js";
 import { agreed } from "../shared/dialog.js";
 import { button, byId, h, showTab } from "../shared/dom.js";
 import { age } from "../shared/format.js";
@@ -138,7 +138,7 @@ async function archive(ids) {
   if (!sure) return;
   try {
     for (const id of ids) {
-      await sendJson("PATCH", clutchPath(id), { archived, reason: "" });
+      await send("PATCH", clutchPath(id), { archived, reason: "" });
       rows.chosen.delete(id);
     }
   } catch (problem) {

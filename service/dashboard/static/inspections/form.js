@@ -1,7 +1,7 @@
 // The form that sends an inspection: its measurements first, then each photograph. What is sent again is known already, so
 // that a form whose photographs were refused in part is mended and sent once more.
 
-import { send, sendJson } from "../shared/api.js";
+import { send } from "../shared/api.js";
 import { field, form, h, symbol } from "../shared/dom.js";
 import { fixed } from "../shared/format.js";
 import { attempted, problemView } from "../shared/problem_view.js";
@@ -58,7 +58,7 @@ export function inspectionForm(path, sent) {
 
   const store = async () => {
     /** @type {{ body: InspectionOut }} */
-    const { body } = await sendJson("POST", path, inspection());
+    const { body } = await send("POST", path, inspection());
     const refused = [];
     for (const file of photographs.files ?? []) {
       const type = { "Content-Type": file.type || "application/octet-stream" };

@@ -3,7 +3,7 @@
 
 import { drawnAlone } from "../charts/sketch.js";
 import { band, planar } from "../charts/traces.js";
-import { send, sendJson } from "../shared/api.js";
+import { send } from "../shared/api.js";
 import { button, field, h, quiet, scrolling, select } from "../shared/dom.js";
 import { quantity, words } from "../shared/format.js";
 import { problemView } from "../shared/problem_view.js";
@@ -202,7 +202,7 @@ export function importer(file, number, run) {
     const save = async () => {
       const kept = { ...profile, name: rigName.value.trim(), file_name: pattern.value.trim() || null };
       try {
-        await sendJson("POST", "/v1/rigs", { ...kept, kind: run.kind.value || profile.kind });
+        await send("POST", "/v1/rigs", { ...kept, kind: run.kind.value || profile.kind });
         chosen = null;
         if (preview) preview.rig = kept.name;
         await look();

@@ -1,6 +1,6 @@
 // A clutch is registered by a form that is submitted, never by a name that was typed: all its values are shown first.
 
-import { sendJson } from "../shared/api.js";
+import { send } from "../shared/api.js";
 import { asked } from "../shared/dialog.js";
 import { button, field, h, quiet } from "../shared/dom.js";
 
@@ -86,7 +86,7 @@ export async function register(id, { similar = [], record = null, lead = "" } = 
     lead: "Not registered. ",
     send: async () => {
       const chosen = name.value.trim();
-      await sendJson("POST", "/v1/clutches", recordOf(chosen, inputs, record));
+      await send("POST", "/v1/clutches", recordOf(chosen, inputs, record));
       return chosen;
     },
   });

@@ -1,6 +1,6 @@
 // One file that is to be sent: what it is, as far as it or its name says so; and what the service made of it.
 
-import { clutchPath, Problem, send, sendJson } from "../shared/api.js";
+import { clutchPath, Problem, send } from "../shared/api.js";
 import { field, h, quiet, select } from "../shared/dom.js";
 import { fixed, kindName } from "../shared/format.js";
 import { problemView } from "../shared/problem_view.js";
@@ -78,7 +78,7 @@ export function runFile(file, json, listed) {
     let answer;
     if (json) {
       const { clutch_id: _, ...run } = JSON.parse(await file.text());
-      answer = await sendJson("POST", `${clutchPath(id)}/runs`, run);
+      answer = await send("POST", `${clutchPath(id)}/runs`, run);
     } else {
       const sent = reading?.sent() ?? file;
       /** @type {Record<string, string>} */

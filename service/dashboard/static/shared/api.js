@@ -66,8 +66,7 @@ async function request(path, options = {}) {
   let answer;
   try {
     answer = await fetch(at(path), { cache: "no-store", ...options, headers });
-  } catch (error) {
-    if (error instanceof DOMException && error.name === "AbortError") throw error;
+  } catch {
     throw new Problem(0, { title: "The service does not answer" });
   }
   if (answer.ok || answer.status === 304) return answer;
@@ -131,32 +130,24 @@ export async function readAll(path, pages = Infinity) {
 }
 
 /**
- * Send something; the answer's body and status.
+ * Send something, a plain object as JSON; the answer's body and status.
  * @template Body
  * @param {string} method
  * @param {string} path
- * @param {BodyInit} body
+ * @param {BodyInit | object} body
  * @param {Record<string, string>} [headers]
  * @returns {Promise<{ status: number, location: string | null, body: Body }>}
  */
 export async function send(method, path, body, headers = {}) {
-  const answer = await request(path, { method, body, headers });
+  const sent =
+    body.constructor === Object
+      ? { body: JSON.stringify(body), headers: { "Content-Type": "application/json", ...headers } }
+      : { body: /** @type {BodyInit} */ (body), headers };
+  const answer = await request(path, { method, ...sent });
   const text = await answer.text();
   const location = answer.headers.get("Location");
   return { status: answer.status, location: location && own(location), body: text ? JSON.parse(text) : null };
 }
-
-/**
- * The same with a value as JSON.
- * @template Body
- * @param {string} method
- * @param {string} path
- * @param {object} value
- * @param {Record<string, string>} [headers]
- * @returns {Promise<{ status: number, location: string | null, body: Body }>}
- */
-export const sendJson = (method, path, value, headers = {}) =>
-  send(method, path, JSON.stringify(value), { "Content-Type": "application/json", ...headers });
 
 /** @type {(path: string) => Promise<string>} an answer as text, for a file that the reader saves */
 export const readText = async (path) => (await request(path)).text();
