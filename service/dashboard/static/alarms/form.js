@@ -3,7 +3,7 @@
 
 import { Problem } from "../shared/api.js";
 import { asked } from "../shared/dialog.js";
-import { field, h } from "../shared/dom.js";
+import { field, h, select } from "../shared/dom.js";
 import { fixed, NOT_A_NUMBER, numberOf, percent, significant, words } from "../shared/format.js";
 
 /** @typedef {AlarmOut["quantity"]} Watched */
@@ -39,10 +39,9 @@ const input = (id, value) => h("input", { id, value });
  * @param {string | null} clutchId of a clutch's page
  */
 export function askRule(rule, clutchId) {
-  const names = /** @type {Watched[]} */ (Object.keys(WATCHED));
   const first = rule?.quantity ?? "remaining_cycles";
-  const options = names.map((name) => h("option", { value: name, selected: name === first }, WATCHED[name].title));
-  const quantity = h("select", { id: "alarm-quantity" }, options);
+  const options = Object.entries(WATCHED).map(([name, { title }]) => /** @type {[string, string]} */ ([name, title]));
+  const quantity = select({ id: "alarm-quantity" }, options, first);
   const limit = input("alarm-limit", String(rule?.below ?? rule?.above ?? WATCHED[first].limit));
   const share = input("alarm-hysteresis", String(100 * (rule?.hysteresis ?? 0.1)));
   const name = input("alarm-name", rule?.name ?? "");

@@ -5,7 +5,7 @@
 import { doubtList } from "../sending/receipt.js";
 import { clutchPath, Problem, readAll, send } from "../shared/api.js";
 import { asked } from "../shared/dialog.js";
-import { button, field, h } from "../shared/dom.js";
+import { button, field, h, select } from "../shared/dom.js";
 import { fixed, kindName, words } from "../shared/format.js";
 import { problemView } from "../shared/problem_view.js";
 
@@ -303,8 +303,7 @@ function ask({ title, lines, action, optional = false, cycles, choice, note, sen
   const numeric = { type: "number", min: 0, step: "any", required: true, inputmode: "decimal" };
   const number = h("input", { id: "changed-cycles", value: cycles, ...numeric });
   const reason = h("input", { id: "reason", required: !optional, maxlength: LONGEST_REASON });
-  const options = choice?.options.map(([value, text]) => h("option", { value }, text)) ?? [];
-  const chosen = h("select", { id: "chosen", required: true }, ...options);
+  const chosen = select({ id: "chosen", required: true }, choice?.options ?? [], null);
   const closed = asked({
     title,
     lines: lines.map((line) => (typeof line === "string" ? line && h("p", line) : line)),

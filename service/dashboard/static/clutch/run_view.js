@@ -21,15 +21,9 @@ export async function runCharts(run, reader) {
   const name = () => `${reader.name()}-${run.run_id.replaceAll(/[^\w.-]+/g, "_")}`;
   const id = `run-${run.run_id}`;
   const record = new Chart({ name, id: `${id}-record`, title: "The record as it was sent", height: 300, wide: true });
+  const options = names.map((key) => /** @type {[string, string]} */ ([key, quantity(key)]));
   const draw = (/** @type {string} */ channel) => {
-    setControls(record, [
-      choice(
-        "Channel",
-        names.map((key) => [key, quantity(key)]),
-        channel,
-        draw,
-      ),
-    ]);
+    setControls(record, [choice("Channel", options, channel, draw)]);
     record.show(recordOf(channels, channel));
   };
   draw(names.includes("torque_nm") ? "torque_nm" : names[0]);

@@ -67,7 +67,7 @@ export function byId(id) {
   return element;
 }
 
-/** @type {(element: Element, margin: number, told: (near: boolean) => unknown) => void} by less than `margin` px to the screen */
+/** @type {(element: Element, margin: number, told: (near: boolean) => unknown) => void} `told` hears whether it is near the screen, px */
 export function watch(element, margin, told) {
   const observer = new IntersectionObserver((entries) => told(entries[entries.length - 1].isIntersecting), {
     rootMargin: `${margin}px`,
@@ -107,7 +107,7 @@ export const quiet = (...content) => h("p.quiet", ...content);
  */
 export const field = (input, label, more = null) => h("div", h("label", { for: input.id }, label), input, more);
 
-/** @type {(submit: () => unknown, ...content: Content[]) => HTMLFormElement} its values are not kept by the browser */
+/** @type {(submit: () => unknown, ...content: Content[]) => HTMLFormElement} a form whose values the browser does not keep */
 export function form(submit, ...content) {
   const onsubmit = (/** @type {SubmitEvent} */ event) => {
     event.preventDefault();

@@ -26,7 +26,7 @@
       try {
         localStorage.setItem("theme", theme);
       } catch {
-        /* the same */
+        /* as above */
       }
       apply();
       changed();

@@ -66,28 +66,27 @@ export function pressureText(bar) {
   return `${fixed(bar === null || bar === undefined ? bar : of(bar), decimals)} ${unit}`;
 }
 
-function unitsMenu() {
-  const now = chosen();
-  /** @type {(label: string, part: Partial<typeof now>) => { label: string, checked: boolean, onclick: () => void }} */
-  const entry = (label, part) => ({
-    label,
-    checked: Object.entries(part).every(([name, value]) => now[/** @type {keyof typeof now} */ (name)] === value),
-    onclick: () => {
-      CHOICE.set(JSON.stringify({ ...now, ...part }));
-      document.dispatchEvent(new Event("unitschange"));
-    },
-  });
-  return menu("Units", [
-    entry("Friction as torque", { friction: "torque" }),
-    entry("Friction as µ", { friction: "cof" }),
-    entry("SI: Nm, bar, m/s", { system: "si" }),
-    entry("US: lbf·ft, psi, ft/s", { system: "us" }),
-  ]);
-}
-
 /** @param {HTMLElement} place in the bar at the top */
 export function placeUnits(place) {
-  const draw = () => place.replaceChildren(unitsMenu());
+  function draw() {
+    const now = chosen();
+    /** @type {(label: string, part: Partial<typeof now>) => { label: string, checked: boolean, onclick: () => void }} */
+    const entry = (label, part) => ({
+      label,
+      checked: Object.entries(part).every(([name, value]) => now[/** @type {keyof typeof now} */ (name)] === value),
+      onclick: () => {
+        CHOICE.set(JSON.stringify({ ...now, ...part }));
+        document.dispatchEvent(new Event("unitschange"));
+      },
+    });
+    const entries = [
+      entry("Friction as torque", { friction: "torque" }),
+      entry("Friction as µ", { friction: "cof" }),
+      entry("SI: Nm, bar, m/s", { system: "si" }),
+      entry("US: lbf·ft, psi, ft/s", { system: "us" }),
+    ];
+    place.replaceChildren(menu("Units", entries));
+  }
   document.addEventListener("unitschange", draw);
   draw();
 }
