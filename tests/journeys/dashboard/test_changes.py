@@ -294,7 +294,7 @@ def test_runs_are_listed_page_by_page_the_latest_first(watched: Watched, server:
     for cycles in range(6010, 6330, 10):
         post(server.http, "bench", {"kind": "maintenance", "cycles": cycles, "event": "other", "note": f"n{cycles}"})
     page = opened(watched)
-    listed = page.locator("#runs .runs details .at")
+    listed = page.locator("#runs .runs summary .number")
     pager = page.get_by_role("navigation", name="Pages of runs")
     expect(listed).to_have_count(25)
     assert listed.first.inner_text() == "6,320 cycles"

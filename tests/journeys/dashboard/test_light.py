@@ -81,6 +81,8 @@ def test_the_library_takes_the_place_of_the_light_drawing(
     for x, y in points[:-1]:
         assert min(abs(x - u) + abs(y - v) for u, v in again) < 2.5, ((x, y), again)
     assert texts(page, "#chart-fan .plot") == said
+    for axis in ("xlines-above", "ylines-above"):
+        assert page.locator(f"#chart-fan .{axis}").get_attribute("d").startswith("M"), axis
     assert chart.bounding_box() == box
     assert page.evaluate("window.shifted") < 0.01
     watched.close()
