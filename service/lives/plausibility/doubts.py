@@ -115,8 +115,8 @@ def _cof_notice(verdict: Verdict, sent: Reading) -> Notice:
     cof = math.exp(sent.log_cof or -20.0)
     beyond = abs(math.log(cof / criteria.COF)) / criteria.LOG_COF_SD > 2.5
     cause = "Is a sensor or a unit wrong?" if beyond else "Is it another clutch's test?"
-    at = f"{_expected(verdict)} at {_number(sent.cycles)} cycles"
-    message = f"mean COF is {cof:.3g}{at}. {cause} Withdraw the run, or confirm it."
+    at = f"at {_number(sent.cycles)} cycles{_expected(verdict)}"
+    message = f"mean COF is {cof:.3g} {at}. {cause} Withdraw the run, or confirm it."
     return Notice(code=BEYOND_PHYSICS if beyond else OFF_COURSE, message=message)
 
 
