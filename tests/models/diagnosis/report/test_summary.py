@@ -231,11 +231,11 @@ def sized(interval: tuple[float, float], sign: float, value: float = 3.06) -> st
 
 
 def test_a_size_and_the_words_on_its_sign_agree() -> None:
-    assert "It reads 3.06 Nm (90 % interval 0.972 to 9.23 Nm) too much." in sized((0.972, 9.23), 0.995)
+    assert "The torque sensor reads 3.06 Nm (90 % interval 0.972 to 9.23 Nm) too much." in sized((0.972, 9.23), 0.995)
     assert "0.1 to 9.23 Nm; this sign has probability 0.97) too much." in sized((0.1, 9.23), 0.97)
     assert "to 6.49 Nm; this sign has probability 0.55) too much." in sized((-4.2, 6.49), 0.55)
-    assert "It reads 3.06 Nm (90 % interval 1 to 4 Nm) too little." in sized((-4.0, -1.0), 0.995, value=-3.06)
-    less = "It reads 0.4 Nm (90 % interval −0.1 to 0.9 Nm; this sign has probability 0.62) too little."
+    assert "sensor reads 3.06 Nm (90 % interval 1 to 4 Nm) too little." in sized((-4.0, -1.0), 0.995, value=-3.06)
+    less = "The torque sensor reads 0.4 Nm (90 % interval −0.1 to 0.9 Nm; this sign has probability 0.62) too little."
     assert less in sized((-0.9, 0.1), 0.62, value=-0.4)
     assert "Its size was not estimated." in sized((-0.8, 0.8), 0.5, value=0.0)
 
