@@ -77,10 +77,9 @@ export function importer(file, number, run) {
   /** @param {Preview} shown */
   function show(shown) {
     preview = shown;
-    if (rig() !== null) {
-      if (shown.kind !== null) run.kind.value = shown.kind;
-      if (shown.cycles !== null) run.cycles.value = String(shown.cycles);
-    }
+    // without a profile the kind is stated where it is the only one that has these channels
+    if (shown.kind !== null && (rig() !== null || run.kind.value === "")) run.kind.value = shown.kind;
+    if (shown.cycles !== null && rig() !== null) run.cycles.value = String(shown.cycles);
     const focused = document.activeElement?.id;
     const left = shown.missing.map(quantity).join(", ");
     const state = shown.problem ?? (left ? `Still missing: ${left}.` : "Ready to send.");
