@@ -87,7 +87,8 @@ def sequences(url: str) -> tuple[type, Told]:
 
     class Sequences(machine):  # type: ignore[misc, valid-type]
         def get_call_kwargs(self, _case: schemathesis.Case) -> dict[str, Any]:
-            return {"base_url": url, "headers": AT_ONCE}
+            # a test of an alarm may be answered after 12 s
+            return {"base_url": url, "headers": AT_ONCE, "timeout": 15.0}
 
         def validate_response(self, response: Any, case: schemathesis.Case, **more: Any) -> None:
             told.statuses[response.status_code] += 1

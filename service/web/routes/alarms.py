@@ -114,7 +114,7 @@ async def delete_alarm(request: Request, context: auth.OwnAdmin, alarm_id: Alarm
 
 @router.post("/{alarm_id}/test", response_model=schemas.TestedOut, responses=CHANGING)
 async def test_alarm(request: Request, context: auth.OwnAdmin, alarm_id: AlarmId) -> Response:
-    """Send a test to each of the rule's receivers, and report the results."""
+    """Send a test to each of the rule's receivers, and report the results, at the latest after 12 s."""
     await run_in_threadpool(alarms.look_up, context.database, alarm_id, only=auth.grant_of(request).clutches)
     names = await run_in_threadpool(change_alarms.test, context.database, alarm_id)
     return await _tested(context, names)
@@ -167,7 +167,7 @@ async def list_deliveries(request: Request, context: auth.Reader, webhook_id: We
 
 @webhook_router.post("/{webhook_id}/test", response_model=schemas.TestedOut, responses=CHANGING)
 async def test_webhook(context: auth.Admin, webhook_id: WebhookId) -> Response:
-    """Send a test to a receiver, and report the result."""
+    """Send a test to a receiver, and report the result, at the latest after 12 s."""
     names = await run_in_threadpool(change_alarms.test_receiver, context.database, webhook_id, at=now())
     return await _tested(context, names)
 
