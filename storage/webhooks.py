@@ -1,13 +1,12 @@
 """The tables of receivers and of deliveries that wait.
 
-A delivery waits until it is `due`. Whoever tries it moves that on first (a lease): where its process is killed meanwhile,
-it is due again when the lease has run out. So each is sent at least once.
+What a receiver is sent of one alarm goes in the order in which it was put here: only the oldest that waits is tried. When,
+the caller decides: no clock of the database is asked. Whoever tries one counts the attempt first; where two would, one does.
 """
 
-from collections.abc import Collection
 from dataclasses import dataclass
 
-from sqlalchemy import Connection, delete, exists, func, select, update
+from sqlalchemy import Connection, delete, func, select, update
 
 from storage.dialects import newest_first, now_in_seconds
 from storage.encoding import Json, Rows
@@ -31,7 +30,7 @@ class WebhookRow:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DeliveryRow:
     """What a receiver is to be sent, of an alarm or (None) as a test: the bytes of the body, as text. `status` and `problem`
-    are of the last attempt, `due` of the next, in seconds since 1970.
+    are of the last attempt, `due` says when the next was planned, in seconds since 1970: nothing waits for that.
     """
 
     delivery_id: str
@@ -50,18 +49,22 @@ class DeliveryRow:
 
 
 _receivers, _deliveries = Rows(WebhookRow), Rows(DeliveryRow, key="delivery_key")
-_of_same = delivery.alias("of_same")
-_oldest_of_each = (
-    select(func.min(_of_same.c.delivery_key))
-    .where(_of_same.c.state == WAITING, _of_same.c.due <= now_in_seconds())
-    .group_by(_of_same.c.webhook_id)
-)
-_due = (
-    select(delivery.c.delivery_key)
-    .where(WAITING_ONLY, delivery.c.delivery_key.in_(_oldest_of_each))
-    .order_by(delivery.c.due)
-    .with_for_update(skip_locked=True, of=delivery)
-)
+#: A test is of no alarm.
+_of_one_alarm = (delivery.c.webhook_id, func.coalesce(delivery.c.event_id, delivery.c.delivery_id))
+_oldest_of_each = select(func.min(delivery.c.delivery_key)).where(WAITING_ONLY).group_by(*_of_one_alarm)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WaitingRow:
+    """What waits in the outbox: how often it was tried, and when the last attempt ended."""
+
+    delivery_key: int
+    webhook_id: str
+    attempts: int
+    last_attempt_at: str | None
+
+
+_waiting = Rows(WaitingRow)
 
 
 def insert(connection: Connection, row: WebhookRow) -> None:
@@ -103,22 +106,18 @@ def deliveries(
     return _deliveries.all(connection.execute(query))
 
 
-def any_due(connection: Connection) -> bool:
-    due = select(delivery.c.delivery_key).where(WAITING_ONLY, delivery.c.due <= now_in_seconds())
-    return bool(connection.execute(select(exists(due))).scalar_one())
+def next_ones(connection: Connection) -> list[WaitingRow]:
+    """Of each receiver and alarm the oldest delivery that waits, oldest first."""
+    query = select(*(delivery.c[name] for name in _waiting.names)).where(delivery.c.delivery_key.in_(_oldest_of_each))
+    return _waiting.all(connection.execute(query.order_by(delivery.c.delivery_key)))
 
 
-def claim(connection: Connection, *, lease: float, most: int, passing: Collection[str] = ()) -> list[DeliveryRow]:
-    """At most so many that are due, the oldest of each receiver but of those `passing` over: the caller's for `lease`
-    [s]."""
-    due = _due.where(delivery.c.webhook_id.not_in(sorted(passing))).limit(most)
-    rows = []
-    for key in connection.execute(due).scalars().all():
-        this = delivery.c.delivery_key == key
-        claimed = {"due": now_in_seconds() + lease, "attempts": delivery.c.attempts + 1}
-        connection.execute(update(delivery).where(this).values(claimed))
-        rows += _deliveries.all(connection.execute(select(delivery).where(this)))
-    return rows
+def claim(connection: Connection, row: WaitingRow) -> DeliveryRow | None:
+    """Count an attempt, which the caller makes; None where another has done so since, or it waits no longer."""
+    this = (delivery.c.delivery_key == row.delivery_key, WAITING_ONLY, delivery.c.attempts == row.attempts)
+    if connection.execute(update(delivery).where(*this).values(attempts=row.attempts + 1)).rowcount != 1:
+        return None
+    return _deliveries.first(connection.execute(select(delivery).where(delivery.c.delivery_key == row.delivery_key)))
 
 
 def end(
@@ -131,17 +130,11 @@ def end(
     problem: str | None,
     pause: float = 0.0,
 ) -> None:
-    """Store how an attempt ended: delivered, given up, or (`waiting`) to be tried again after `pause` [s]."""
+    """Store how an attempt ended: delivered, given up, or (`waiting`) to be tried again, as planned after `pause` [s]."""
     ended = {"state": state, "last_attempt_at": at, "status": status, "problem": problem}
     delivered = {"delivered_at": at if state == DELIVERED else None, "due": now_in_seconds() + pause}
     this = update(delivery).where(delivery.c.delivery_key == delivery_key, WAITING_ONLY)
     connection.execute(this.values(ended | delivered))
-
-
-def release_all(connection: Connection) -> None:
-    """Have what was claimed for its first attempt be due now: no process runs that could be sending it."""
-    unsent = (WAITING_ONLY, delivery.c.last_attempt_at.is_(None))
-    connection.execute(update(delivery).where(*unsent).values(due=0.0))
 
 
 def count_waiting(connection: Connection) -> int:

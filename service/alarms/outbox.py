@@ -1,13 +1,18 @@
 """The outbox: a thread of the service sends alarms until their receivers have taken them, and raises alarms of silent rigs.
 
-At least once: an attempt takes its delivery for some time and ends it afterwards. Where the service is killed between the
-two, the delivery is due again when that time has run out, or at the next start.
+At least once: an attempt is counted before it is made, and its end stored afterwards. Where the service is killed between
+the two, it is made again.
+
+What waits, waits by this process's own clock, which nobody sets, and is given up by the number of its attempts: a wall clock
+that is set forward or back delays no alarm and drops none. A start tries what waits at once.
 """
 
 import logging
 import threading
 import time
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from datetime import UTC, datetime
 
 from sqlalchemy import Connection
@@ -19,18 +24,19 @@ from service.settings import Settings
 from storage import alarms, clutches, keys, webhooks
 from storage.engine.database import Database
 from storage.engine.errors import StorageError
-from storage.webhooks import DeliveryRow, WebhookRow
+from storage.webhooks import DeliveryRow, WaitingRow, WebhookRow
 
 #: [s] Between two looks into the outbox, and at the clock for silent rigs. Chosen: an alarm arrives while the page still
 #: loads; a rig is silent for hours.
 LOOK_SECONDS, CLOCK_SECONDS = 0.5, 10.0
-#: [s] An attempt's delivery is nobody else's. Derived: an attempt, its name's resolution, a busy database.
+#: [s] What another service has begun to send is left to it for so much longer than it would pause, and an attempt whose end
+#: could not be stored is made again. Derived: an attempt, its name's resolution, a busy database.
 LEASE_SECONDS = 60.0
 #: Attempts at once. Chosen: one receiver that does not answer holds up no other, for of each there is one at a time.
 _AT_ONCE = 8
-#: [s] The pause after an attempt doubles up to the greatest; a delivery is given up when it is so old. Chosen: a receiver
-#: that is down over a weekend learns of it.
-FIRST_PAUSE, LAST_PAUSE, LONGEST = 1.0, 3600.0, 3 * 86400.0
+#: [s] The pause after an attempt doubles up to the greatest. After so many attempts a delivery is given up. Derived: they
+#: take three days, so that a receiver that is down over a weekend learns of it.
+FIRST_PAUSE, LAST_PAUSE, MAX_ATTEMPTS = 1.0, 3600.0, 83
 _SECONDS_PER_HOUR = 3600.0
 _log = logging.getLogger("clutchlife")
 
@@ -46,19 +52,14 @@ class Outbox:
         self._woken = False
         self._away = False
         self._busy: set[str] = set()
+        # by delivery what was seen of it (its attempts, the end of the last), and when it is due by the monotonic clock
+        self._planned: dict[int, tuple[tuple[int, str | None], float]] = {}
         self._clock = 0.0
         self._judged: set[tuple[str, str, str, str]] = set()
         self._pool = ThreadPoolExecutor(_AT_ONCE, thread_name_prefix="deliver")
         self._thread = threading.Thread(target=self._work, name="outbox", daemon=True)
 
     def start(self) -> None:
-        """Begin. On a file what an earlier service had begun to send is due at once: no other service uses it."""
-        if self._database.path is not None:
-            with self._database.reading() as connection:
-                left = webhooks.count_waiting(connection)
-            if left:
-                with self._database.writing() as connection:
-                    webhooks.release_all(connection)
         self._thread.start()
 
     def close(self) -> None:
@@ -96,29 +97,58 @@ class Outbox:
 
     def _deliver(self) -> None:
         with self._database.reading() as connection:
-            if not webhooks.any_due(connection):
-                return
-        with self._change:
-            busy = frozenset(self._busy)
+            waiting = webhooks.next_ones(connection)
+        due = self._due(waiting)
+        if not due:
+            return
         with self._database.writing(of="outbox") as connection:
-            claimed = webhooks.claim(connection, lease=LEASE_SECONDS, most=_AT_ONCE - len(busy), passing=busy)
+            claimed = [row for each in due if (row := webhooks.claim(connection, each)) is not None]
             to = {row.webhook_id: webhooks.get(connection, row.webhook_id) for row in claimed}
             keyed = keys.any_ever(connection)
         private = self._settings.private_receivers
         private = not keyed if private is None else private
         for row in claimed:
+            self._plan(row, LEASE_SECONDS)
             receiver = to[row.webhook_id]
             if receiver is not None:
                 with self._change:
                     self._busy.add(row.webhook_id)
                 self._pool.submit(self._attempt, row, receiver, private=private)
 
+    def _due(self, waiting: Sequence[WaitingRow]) -> list[WaitingRow]:
+        """Those that are to be tried now: one of each receiver, at most so many at once."""
+        now, due = time.monotonic(), dict[str, WaitingRow]()
+        with self._change:
+            known, self._planned = self._planned, {}
+            for row in waiting:
+                seen = (row.attempts, row.last_attempt_at)
+                before = known.get(row.delivery_key)
+                planned = (
+                    before if before is not None and before[0] == seen else (seen, now + self._left_to_others(row))
+                )
+                self._planned[row.delivery_key] = planned
+                if planned[1] <= now and row.webhook_id not in self._busy:
+                    due.setdefault(row.webhook_id, row)
+            return list(due.values())[: _AT_ONCE - len(self._busy)]
+
+    def _left_to_others(self, row: WaitingRow) -> float:
+        """Seconds after which this service tries what it has not seen so: a file has no other service."""
+        return (
+            0.0 if self._database.path is not None or row.attempts == 0 else pause_after(row.attempts) + LEASE_SECONDS
+        )
+
+    def _plan(self, row: DeliveryRow, pause: float) -> None:
+        """Try a delivery again after so many seconds."""
+        with self._change:
+            self._planned[row.delivery_key] = (row.attempts, row.last_attempt_at), time.monotonic() + pause
+
     def _attempt(self, row: DeliveryRow, receiver: WebhookRow, *, private: bool) -> None:
         try:
             secret, name = receiver.secret, row.delivery_id
             ended = notify.send(receiver.address, row.body.encode(), secret=secret, delivery_id=name, private=private)
             with self._database.writing(of="outbox") as connection:
-                _store(connection, row, ended)
+                tried = _store(connection, row, ended)
+            self._plan(tried, pause_after(tried.attempts))
         except StorageError as error:
             _log.warning("delivery %s is tried again: %s", row.delivery_id, error)
         except Exception:  # noqa: BLE001  (it is due again when its time has run out)
@@ -154,14 +184,22 @@ class Outbox:
         self._judged = judged
 
 
-def _store(connection: Connection, row: DeliveryRow, ended: Attempt) -> None:
-    """Store how an attempt ended. A test message is tried only once."""
-    now = datetime.now(UTC)
-    state, pause = webhooks.DELIVERED, 0.0
-    if ended.problem is not None:
-        old = (now - datetime.fromisoformat(row.created_at)).total_seconds() > LONGEST
-        state = webhooks.FAILED if old or row.event_id is None else webhooks.WAITING
-        pause = min(FIRST_PAUSE * 2.0 ** min(row.attempts, 30), LAST_PAUSE)
-        _log.warning("delivery %s, attempt %d: %s", row.delivery_id, row.attempts, ended.problem)
-    at = now.isoformat(timespec="milliseconds")
-    webhooks.end(connection, row.delivery_key, state, at=at, status=ended.status, problem=ended.problem, pause=pause)
+def pause_after(attempts: int) -> float:
+    """Seconds between so many attempts and the next."""
+    return min(FIRST_PAUSE * 2.0 ** min(attempts, 30), LAST_PAUSE)
+
+
+def _store(connection: Connection, row: DeliveryRow, ended: Attempt) -> DeliveryRow:
+    """Store how an attempt ended, and return the delivery as it is then. A test message is tried only once."""
+    state, problem = webhooks.DELIVERED, ended.problem
+    if problem is not None:
+        state = webhooks.WAITING
+        _log.warning("delivery %s, attempt %d: %s", row.delivery_id, row.attempts, problem)
+        if row.event_id is None:
+            state = webhooks.FAILED
+        elif row.attempts >= MAX_ATTEMPTS:
+            state, problem = webhooks.FAILED, f"given up after {row.attempts} attempts: {problem}"
+            _log.error("delivery %s of alarm %s to %s: %s", row.delivery_id, row.event_id, row.webhook_id, problem)
+    at, pause = datetime.now(UTC).isoformat(timespec="milliseconds"), pause_after(row.attempts)
+    webhooks.end(connection, row.delivery_key, state, at=at, status=ended.status, problem=problem, pause=pause)
+    return replace(row, last_attempt_at=at)

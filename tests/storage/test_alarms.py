@@ -6,7 +6,7 @@ import pytest
 from sqlalchemy import Connection
 from sqlalchemy.exc import IntegrityError
 
-from storage import alarms, clutches, webhooks
+from storage import alarms, webhooks
 from storage.alarms import AlarmRow, EventRow
 from storage.engine.database import Database
 from storage.webhooks import DeliveryRow, WebhookRow
@@ -45,37 +45,42 @@ def test_a_rule_has_one_open_alarm_of_a_clutch(connection: Connection) -> None:
     assert list(alarms.open_of_clutch(connection, CLUTCH)) == ["a"]
 
 
-def test_a_delivery_is_somebodys_for_a_while_then_anybodys(database: Database) -> None:
+def test_of_one_alarm_a_receiver_is_sent_what_came_first(database: Database) -> None:
     with database.writing() as connection:
         for name in ("w", "other"):
             webhooks.insert(connection, replace(RECEIVER, webhook_id=name))
-        for name, receiver in (("d1", "w"), ("d2", "w"), ("d3", "other")):
-            new = DeliveryRow(delivery_id=name, webhook_id=receiver, event_id="e1", body="{}", created_at=AT)
+        for name, receiver, event in (
+            ("raised", "w", "e1"), ("cleared", "w", "e1"), ("of another", "w", "e2"), ("raised too", "other", "e1"),
+            ("test", "w", None), ("test too", "w", None),
+        ):  # fmt: skip
+            new = DeliveryRow(delivery_id=name, webhook_id=receiver, event_id=event, body="{}", created_at=AT)
             webhooks.insert_delivery(connection, new)
+
+    def next_ones() -> list[str]:
+        with database.reading() as connection:
+            names = [webhooks.deliveries(connection, name, limit=9) for name in ("w", "other")]
+            named = {row.delivery_key: row.delivery_id for rows in names for row in rows}
+            return [named[row.delivery_key] for row in webhooks.next_ones(connection)]
+
+    assert next_ones() == ["raised", "of another", "raised too", "test", "test too"]
     with database.writing() as connection:
-        claimed = webhooks.claim(connection, lease=60.0, most=8)
-        assert [row.delivery_id for row in claimed] == ["d1", "d3"], "of each receiver the oldest"
+        first = webhooks.next_ones(connection)[0]
+        claimed = webhooks.claim(connection, first)
+        assert (claimed.delivery_id, claimed.attempts) == ("raised", 1)
+        assert webhooks.claim(connection, first) is None, "another has claimed it"
+        webhooks.end(connection, first.delivery_key, webhooks.WAITING, at=AT, status=500, problem="no", pause=9.0)
+    assert next_ones()[0] == "raised", "what waits for its next attempt is not passed"
     with database.writing() as connection:
-        assert [row.delivery_id for row in webhooks.claim(connection, lease=60.0, most=8, passing=["w"])] == []
-        assert [row.delivery_id for row in webhooks.claim(connection, lease=60.0, most=8)] == ["d2"]
-        assert not webhooks.any_due(connection)
-        webhooks.release_all(connection)
-        assert webhooks.any_due(connection)
-        (first, _) = webhooks.claim(connection, lease=60.0, most=8)
-        webhooks.end(connection, first.delivery_key, webhooks.WAITING, at=AT, status=500, problem="no", pause=0.0)
-    with database.writing() as connection:
-        (again,) = webhooks.claim(connection, lease=60.0, most=8)
-        assert (again.delivery_id, again.attempts, again.problem) == ("d1", 3, "no")
-        webhooks.end(connection, again.delivery_key, webhooks.DELIVERED, at=AT, status=200, problem=None)
-        stored = webhooks.find_delivery(connection, "d1")
+        (again, *_) = webhooks.next_ones(connection)
+        assert (again.attempts, again.last_attempt_at) == (1, AT)
+        claimed = webhooks.claim(connection, again)
+        assert (claimed.attempts, claimed.problem) == (2, "no")
+        webhooks.end(connection, claimed.delivery_key, webhooks.DELIVERED, at=AT, status=200, problem=None)
+        stored = webhooks.find_delivery(connection, "raised")
         assert (stored.state, stored.delivered_at, stored.problem) == (webhooks.DELIVERED, AT, None)
-        assert webhooks.count_waiting(connection) == 2
+        assert webhooks.claim(connection, replace(again, attempts=2)) is None, "it waits no longer"
+        assert webhooks.count_waiting(connection) == 5
+    assert next_ones() == ["cleared", "of another", "raised too", "test", "test too"]
+    with database.writing() as connection:
         webhooks.remove(connection, "w")
         assert [row.webhook_id for row in webhooks.page(connection)] == ["other"]
-
-
-def test_since_when_a_rig_is_silent_is_noted_with_the_state(connection: Connection) -> None:
-    clutches.set_silent(connection, CLUTCH, AT, state="check")
-    row = clutches.get(connection, CLUTCH)
-    assert (row.silent, row.state) == (AT, "check")
-    assert alarms.last_heard(connection, [CLUTCH]) == {}
