@@ -17,11 +17,12 @@ from service.queries.cache import AnswerCache, Revalidation
 from service.settings import CODE_VERSION, MIB, Settings
 from service.web import openapi, problems
 from service.web.answers import now
+from service.web.bodies import Bodies
 from service.web.context import Context
-from service.web.files import emptied_folder
+from service.web.files import Copies, emptied_folder
 from service.web.limits import MAX_CACHED_BYTES
 from service.web.metrics import Metrics
-from service.web.middleware import BodyLimit, Edge, Encodings, Heads, Polls, RootPath, Shares
+from service.web.middleware import Answers, Edge, Encodings, Heads, Polls, RootPath, Shares
 from service.web.readiness import Readiness
 from service.web.routes import alarms, clutches, diagnoses, exports, health, inspections, jobs, life, rigs, runs
 from service.work.queue import JobQueue, Kind, diagnosis_work, workflow_work
@@ -103,6 +104,7 @@ def create_app(settings: Settings) -> FastAPI:
                     revalidation=Revalidation(cache),
                     readiness=readiness,
                     folder=folder,
+                    copies=Copies(folder, 2 * settings.max_file_mb * MIB),
                 )
                 yield
             finally:
@@ -132,9 +134,10 @@ def create_app(settings: Settings) -> FastAPI:
     openapi.install(app, settings.root_path)
     app.add_middleware(Polls)
     app.add_middleware(
-        BodyLimit, most=settings.max_body_mb * MIB, most_file=settings.max_file_mb * MIB, seconds=settings.body_seconds
+        Bodies, most=settings.max_body_mb * MIB, most_file=settings.max_file_mb * MIB, seconds=settings.body_seconds
     )
     app.add_middleware(Encodings)
+    app.add_middleware(Answers)
     app.add_middleware(Heads)
     app.add_middleware(Shares, per_second=settings.requests_per_second, at_once=settings.requests_at_once)
     app.add_middleware(Edge, metrics=metrics)

@@ -4,10 +4,11 @@ A photograph is stored once, named by the SHA-256 of its bytes, whichever inspec
 inspection that was withdrawn stays stored with its photographs.
 """
 
+import sqlite3
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from sqlalchemy import Connection, select, tuple_, update
+from sqlalchemy import Connection, LargeBinary, func, literal_column, select, tuple_, update
 
 from storage.dialects import among
 from storage.encoding import Json, Rows
@@ -100,6 +101,18 @@ def data(connection: Connection, inspection_key: int, sha256: str) -> bytes | No
     wanted = (inspection_photograph.c.inspection_key == inspection_key, photograph.c.sha256 == sha256)
     content: bytes | None = connection.execute(of_inspection.where(*wanted)).scalar()
     return content
+
+
+def piece(connection: Connection, sha256: str, start: int, size: int) -> bytes:
+    """So many bytes of a photograph from `start` on; no more of it comes into memory."""
+    if connection.dialect.name == "sqlite":  # whose substr would read all of it first
+        row: int = connection.execute(select(literal_column("rowid")).where(photograph.c.sha256 == sha256)).scalar_one()
+        file: sqlite3.Connection = connection.connection.driver_connection  # type: ignore[assignment]
+        with file.blobopen(photograph.name, photograph.c.data.name, row, readonly=True) as blob:
+            blob.seek(start)
+            return blob.read(size)
+    content = func.substr(photograph.c.data, start + 1, size, type_=LargeBinary)
+    return bytes(connection.execute(select(content).where(photograph.c.sha256 == sha256)).scalar_one())
 
 
 def attach(connection: Connection, inspection_key: int, row: PhotographRow, content: bytes, *, position: int) -> None:

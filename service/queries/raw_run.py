@@ -23,6 +23,7 @@ from service.errors import NotAcceptableError, NotFoundError
 from storage import changes, channels
 from storage.encoding import to_text
 from storage.engine.database import Database
+from storage.engine.errors import DamagedData
 
 #: Values that are written at once: as JSON some 150 kB, and a millisecond in which no other thread runs.
 _VALUES = 1 << 13
@@ -136,14 +137,17 @@ def file_sha256(database: Database, clutch_id: str, run_id: str) -> str:
     return str(file["sha256"])
 
 
-def copy_file(database: Database, clutch_id: str, run_id: str, path: Path) -> None:
-    """Write the file that a run was read from to `path`, as it was sent. Raises NotFoundError where there is none."""
+def copy_file(database: Database, clutch_id: str, run_id: str, *, path: Path) -> None:
+    """Write the file that a run was read from to `path`, as it was sent. Raises NotFoundError where there is none, and
+    DamagedData where it is not what was sent."""
     with database.reading() as connection:
-        stored = channels.file_of(connection, stored_runs.run(connection, clutch_id, run_id).run_key)
+        row = stored_runs.run(connection, clutch_id, run_id)
+        stored = channels.file_of(connection, row.run_key)
     if stored is None:
         raise NotFoundError(f"run {run_id!r} was not sent as a file")
     with path.open("wb") as file:
-        stored.copy_to(file)
+        if stored.copy_to(file) != row.details["file"]["sha256"]:
+            raise DamagedData(f"the file of run {run_id} differs from what was sent")
 
 
 def _packed(file: BinaryIO) -> gzip.GzipFile:

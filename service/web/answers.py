@@ -26,9 +26,9 @@ from starlette.requests import ClientDisconnect
 from service.errors import UnsupportedMediaTypeError, unknown_clutch
 from service.lists import ALL_ITEMS, WHOLE, Part, from_cursor
 from service.queries.cache import Answer, Made, Page, name_of, revision_and_json, shared_answer, to_json
-from service.run_files.json_run import checked
 from service.schemas.parameters import ClutchId
 from service.web.auth import Admin, Reader, grant_of, snapshot_of
+from service.web.bodies import parsed
 from service.web.context import Context, Cursor, Limit, Whole
 from service.web.limits import LONGEST_WAIT_SECONDS, USUAL_ITEMS, WAIT_SECONDS
 from service.web.middleware import Again, remember
@@ -342,7 +342,7 @@ async def sent(request: Request, schema: type[Body]) -> Body:
     Raises UnsupportedMediaTypeError, and InvalidError, which names every place that is wrong.
     """
     require_json(request)
-    return checked(schema, await request.body())
+    return await parsed(schema, await request.body())
 
 
 def require_json(request: Request) -> None:

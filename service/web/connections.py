@@ -2,18 +2,28 @@
 
 The head of a request is bounded in bytes (431) and in time (408), trailers after its body too, and one address has only so
 many connections: else whoever opens some hundreds and says nothing uses up the files that the process may have open, and one
-that sends header lines without end fills its memory, before any key is looked at.
+that sends header lines without end fills its memory, before any key is looked at. A reader that does not take a piece of its
+answer in time is cut off.
 """
 
 import asyncio
 import http
 import resource
+import socket
 from typing import Any, NoReturn
 
 from uvicorn.config import Config
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
-from service.web.limits import HEAD_SECONDS, LINGER_SECONDS, MAX_AHEAD, MAX_HEAD_BYTES, RETRY_AFTER_SECONDS
+from service.web.limits import (
+    HEAD_SECONDS,
+    LINGER_SECONDS,
+    MAX_AHEAD,
+    MAX_HEAD_BYTES,
+    PIECE_BYTES,
+    RETRY_AFTER_SECONDS,
+    TAKEN_SECONDS,
+)
 
 #: Bytes of a header line beside its name and its value.
 _SEPARATORS = len(": \r\n")
@@ -25,13 +35,19 @@ _HEAD_TOO_LARGE = (
 )
 
 
-def bounded(most: int, head_seconds: float = HEAD_SECONDS) -> type[asyncio.Protocol]:
-    """uvicorn's protocol with `most` connections of one address, each request's head sent within `head_seconds`."""
+def bounded(
+    most: int, head_seconds: float = HEAD_SECONDS, taken_seconds: float = TAKEN_SECONDS
+) -> type[asyncio.Protocol]:
+    """uvicorn's protocol with `most` connections of one address, each request's head sent within `head_seconds`, what is
+    written of an answer taken within `taken_seconds`."""
 
     class Bounded(HttpToolsProtocol):
         def __init__(self, config: Config, *arguments: Any, **more: Any) -> None:
             super().__init__(config, *arguments, **more)
             self._deadline: asyncio.TimerHandle | None = None
+            self._taking: asyncio.TimerHandle | None = (
+                None  # ends the connection unless what was written is taken before
+            )
             self._head_bytes = 0  # of the request's lines that the parser has passed on, its trailers among them
             self._held_bytes = 0  # that arrived since the parser passed anything on: it keeps what is unfinished
             self._in_head = False
@@ -40,6 +56,9 @@ def bounded(most: int, head_seconds: float = HEAD_SECONDS) -> type[asyncio.Proto
 
         def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
             super().connection_made(transport)
+            transport.set_write_buffer_limits(high=0)  # paused is: the reader has not taken all that was written
+            line: socket.socket = transport.get_extra_info("socket")
+            line.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, PIECE_BYTES)  # else the system takes megabytes for it
             others: set[Any] = self.connections  # of this protocol all of them
             addresses = [other.client[0] for other in others if other.client is not None]
             if self.client is not None and addresses.count(self.client[0]) > most:
@@ -64,8 +83,17 @@ def bounded(most: int, head_seconds: float = HEAD_SECONDS) -> type[asyncio.Proto
             else:
                 self._end_deadline()
 
+        def pause_writing(self) -> None:
+            self._taking = self.loop.call_later(taken_seconds, self.transport.abort)
+            super().pause_writing()
+
+        def resume_writing(self) -> None:
+            self._end_taking()
+            super().resume_writing()
+
         def connection_lost(self, exc: Exception | None) -> None:
             self._end_deadline()
+            self._end_taking()
             super().connection_lost(exc)
 
         def on_message_begin(self) -> None:
@@ -142,6 +170,11 @@ def bounded(most: int, head_seconds: float = HEAD_SECONDS) -> type[asyncio.Proto
                 self._refuse(http.HTTPStatus.REQUEST_TIMEOUT, text)
             else:
                 self.transport.close()
+
+        def _end_taking(self) -> None:
+            if self._taking is not None:
+                self._taking.cancel()
+                self._taking = None
 
         def _end_deadline(self) -> None:
             if self._deadline is not None:

@@ -17,6 +17,7 @@ from service.lists import ALL_ITEMS, LONGEST_CURSOR
 from service.queries.cache import AnswerCache, Revalidation
 from service.schemas.parameters import SHORT
 from service.settings import Settings
+from service.web.files import Copies
 from service.web.limits import MAX_HORIZONS, MAX_ITEMS, MAX_PRESSURE_BAR, USE_NOTED_SECONDS
 from service.web.metrics import Metrics
 from service.web.readiness import Readiness
@@ -70,6 +71,8 @@ class Context:
     readiness: Readiness
     #: Where files are kept while they come in and go out.
     folder: Path
+    #: Copies of runs while they are sent.
+    copies: Copies
     key_uses: KeyUses = field(default_factory=KeyUses)
 
 

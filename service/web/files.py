@@ -1,33 +1,39 @@
-"""Receives and sends files, which are kept on disk meanwhile; `Accept` chooses the form of an answer."""
+"""Receives and sends files, which are kept on disk meanwhile; `Accept` chooses the form of an answer.
 
+The disk is asked in threads alone: one that does not answer must not hold up the event loop.
+"""
+
+import asyncio
 import os
 import re
 import shutil
 import tempfile
-from collections.abc import AsyncIterable, AsyncIterator, Iterator, Mapping, Sequence
-from contextlib import asynccontextmanager
+from collections.abc import AsyncIterable, AsyncIterator, Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Future
+from contextlib import AbstractAsyncContextManager, asynccontextmanager
+from functools import partial
 from pathlib import Path
-from typing import IO, BinaryIO
+from typing import IO, Any, BinaryIO
 
 from fastapi import Request
+from fastapi.concurrency import contextmanager_in_threadpool, run_in_threadpool
 from fastapi.responses import Response, StreamingResponse
 from starlette.datastructures import UploadFile
+from starlette.types import Receive, Scope, Send
 
-from service.errors import InvalidError
-from service.run_files.json_run import checked
+from service.errors import BusyError, InvalidError
 from service.run_files.rig_profile import require_usable
 from service.schemas.rig import RigProfile
-from service.web.limits import MAX_BYTES_IN_MEMORY
+from service.web.bodies import Room, parsed
+from service.web.limits import COPIES_SHARE, MAX_BYTES_IN_MEMORY, PIECE_BYTES
 
 FILE_TYPE = "application/octet-stream"
 #: A file of any format, as the API's description has it, and as the body of a request.
 FILE_CONTENT = {FILE_TYPE: {"schema": {"type": "string", "format": "binary"}}}
 FILE_BODY = {"requestBody": {"required": True, "content": FILE_CONTENT}}
 PARQUET_TYPE = "application/vnd.apache.parquet"
-#: Bytes of a file that are sent at once. Chosen: a few writes to the socket.
-_PIECE = 1 << 18
-#: Bytes of a form's file that are written at once.
-_CHUNK = 1 << 20
+#: Of an answer that is packed by itself: it goes out as it is. `middleware.Encodings` takes the header off.
+PACKED = {"Content-Encoding": "identity"}
 
 
 def emptied_folder(database: Path | None) -> Path:
@@ -52,17 +58,31 @@ async def body_or_file(request: Request, folder: Path) -> AsyncIterator[bytes | 
     else:
         yield bytes(received)
         return
-    with tempfile.NamedTemporaryFile(dir=folder) as file:
-        file.write(received)
+    async with contextmanager_in_threadpool(tempfile.NamedTemporaryFile(dir=folder)) as file:
+        await run_in_threadpool(file.write, received)
         received.clear()
         await written(pieces, file)
         yield Path(file.name)
 
 
+def temporary_folder(folder: Path) -> AbstractAsyncContextManager[str]:
+    """A folder in that folder, removed in the end."""
+    return contextmanager_in_threadpool(tempfile.TemporaryDirectory(dir=folder))
+
+
 async def written(pieces: AsyncIterable[bytes], file: IO[bytes]) -> None:
     """Write what arrives to a file as it does."""
+    gathered = bytearray()
     async for piece in pieces:
-        file.write(piece)
+        gathered += piece
+        if len(gathered) >= PIECE_BYTES:
+            await run_in_threadpool(file.write, bytes(gathered))
+            gathered.clear()
+    await run_in_threadpool(_end, file, bytes(gathered))
+
+
+def _end(file: IO[bytes], last: bytes) -> None:
+    file.write(last)
     file.flush()
 
 
@@ -72,21 +92,32 @@ async def received(request: Request, path: Path, filename: str) -> tuple[str, Ri
     Raises InvalidError where the form has no file or its profile cannot be used.
     """
     if not request.headers.get("content-type", "").startswith("multipart/form-data"):
-        with path.open("wb") as file:
+        async with opened(path, "wb") as file:
             await written(request.stream(), file)
         return filename, None
     async with request.form(max_files=1, max_fields=8) as form:
         sent = next((part for part in form.values() if isinstance(part, UploadFile)), None)
         if sent is None:
             raise InvalidError("the form must have exactly one file")
-        with path.open("wb") as file:
-            while chunk := await sent.read(_CHUNK):
-                file.write(chunk)
+        async with opened(path, "wb") as file:
+            await written(_pieces_of(sent), file)
         text = form.get("profile")
-        profile = checked(RigProfile, text.encode()) if isinstance(text, str) else None
+        profile = await parsed(RigProfile, text.encode()) if isinstance(text, str) else None
     if profile is not None:
         require_usable(profile)
     return sent.filename or filename, profile
+
+
+@asynccontextmanager
+async def opened(path: Path, mode: str) -> AsyncIterator[IO[bytes]]:
+    """A file opened inside."""
+    async with contextmanager_in_threadpool(await run_in_threadpool(path.open, mode)) as file:
+        yield file
+
+
+async def _pieces_of(sent: UploadFile) -> AsyncIterator[bytes]:
+    while piece := await sent.read(PIECE_BYTES):
+        yield piece
 
 
 def preferred(request: Request, media_types: Sequence[str]) -> str:
@@ -99,13 +130,65 @@ def preferred(request: Request, media_types: Sequence[str]) -> str:
     return max(media_types, key=lambda name: weights.get(name, 0.0))
 
 
-def streamed(body: BinaryIO, media_type: str, headers: Mapping[str, str]) -> Response:
-    """An open file as an answer, sent piece by piece and closed at its end."""
-    size = {"Content-Length": str(os.fstat(body.fileno()).st_size)}
+class Copies:
+    """Copies of runs and their files, made in a folder to be sent: at most `most` bytes together, and a share of what is
+    free on the disk."""
 
-    def pieces() -> Iterator[bytes]:
-        with body:
-            while piece := body.read(_PIECE):
-                yield piece
+    def __init__(self, folder: Path, most: int) -> None:
+        self._folder = folder
+        self._most = most
+        self._room = Room(most)
 
-    return StreamingResponse(pieces(), media_type=media_type, headers=dict(headers) | size)
+    async def made(self, make: Callable[[Path], "Future[Any]"]) -> tuple["Copy", Any]:
+        """What `make` writes, as an open file whose name is gone, and what it returns. Raises BusyError where the copies
+        that are being sent leave no room."""
+        if self._room.left <= 0:
+            raise BusyError(_NO_ROOM)
+        async with temporary_folder(self._folder) as folder:
+            path = Path(folder) / "copy"
+            returned = await asyncio.wrap_future(make(path))
+            file, size, free = await run_in_threadpool(_measured, path)
+        held = self._most - self._room.left + size
+        if held > COPIES_SHARE * (free + held) or not self._room.take(size):
+            file.close()
+            raise BusyError(_NO_ROOM)
+        return Copy(file, size, lambda: self._room.take(-size)), returned
+
+
+_NO_ROOM = "the copies of runs that are being sent use all available room on the disk: try again later"
+
+
+def _measured(path: Path) -> tuple[BinaryIO, int, int]:
+    """An opened file, its bytes, and the bytes that are free on its disk."""
+    file = path.open("rb")
+    return file, os.fstat(file.fileno()).st_size, shutil.disk_usage(path.parent).free
+
+
+class Copy:
+    """An open file that is sent once."""
+
+    def __init__(self, file: BinaryIO, size: int, end: Callable[[], object]) -> None:
+        self._file, self._size, self._end = file, size, end
+
+    def answer(self, media_type: str, headers: Mapping[str, str]) -> Response:
+        """The file piece by piece; closed at its end, or when the reader has gone."""
+        headers = dict(headers) | {"Content-Length": str(self._size)}
+        return _Sent(self, iter(partial(self._file.read, PIECE_BYTES), b""), media_type=media_type, headers=headers)
+
+    def close(self) -> None:
+        self._file.close()
+        self._end()
+
+
+class _Sent(StreamingResponse):
+    """The answer that sends a copy."""
+
+    def __init__(self, copy: Copy, pieces: Iterator[bytes], **more: Any) -> None:
+        super().__init__(pieces, **more)
+        self._copy = copy
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        try:
+            await super().__call__(scope, receive, send)
+        finally:
+            self._copy.close()

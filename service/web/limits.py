@@ -11,8 +11,20 @@ LARGE_BODY_BYTES = 1 << 17
 #: Chosen: plateaus and dynamic tests are shorter; a container of 1 GiB has 300 MiB of processes, and a body is there up to
 #: three times while it is passed on.
 MAX_BYTES_IN_MEMORY, MAX_BODIES_IN_MEMORY = 1 << 20, 64 << 20
-#: Bytes of any other body. Chosen: four times a plan of 1,000 blocks; checking the worst takes some 20 ms.
-MAX_SHORT_BODY_BYTES = 1 << 18
+#: Bytes of any other body, and from which on it is checked in a thread. Chosen: four times a plan of 1,000 blocks; checking
+#: the worst takes some 20 ms, of 64 KiB 5.
+MAX_SHORT_BODY_BYTES, MAX_CHECKED_BYTES = 1 << 18, 1 << 16
+#: Times its own bytes that a packed body may hold, once it is longer than a piece. Chosen: a recorder's text is packed to a
+#: third up to a fortieth, zeros to a thousandth.
+MAX_RATIO = 200
+#: Bytes that are unpacked, read and sent at once. Chosen: a few writes to the socket.
+PIECE_BYTES = 1 << 18
+#: Bytes of answers that readers may have in memory together beside one piece each, and seconds within which a reader must
+#: take a piece. Chosen: as for bodies; a modem's line takes four.
+MAX_ANSWERS_IN_MEMORY, TAKEN_SECONDS = 64 << 20, 30.0
+#: Share of the disk's free room that copies may have which are made of runs and their files while these are sent. Chosen:
+#: the other half is left to runs that come in.
+COPIES_SHARE = 0.5
 #: Addresses whose answers are found again before the request is looked at. Chosen: a page asks for some twenty a clutch.
 MAX_POLLED = 4096
 #: Bytes of an answer from which it is packed, and how hard. Chosen: shorter ones fit in two packets of a network anyway; no

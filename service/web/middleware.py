@@ -1,6 +1,5 @@
-"""Handles what all requests share: ids, logs, limits per caller, body sizes, compression, and headers."""
+"""Handles what all requests share: ids, logs, limits per caller, compression, and headers."""
 
-import asyncio
 import hashlib
 import math
 import secrets
@@ -14,6 +13,7 @@ from logging import DEBUG, INFO, WARNING
 from typing import Any
 from urllib.parse import urlsplit
 
+from fastapi.concurrency import run_in_threadpool
 from fastapi.dependencies.utils import request_params_to_args
 from fastapi.responses import Response
 from starlette.datastructures import Headers, MutableHeaders, QueryParams
@@ -22,19 +22,11 @@ from starlette.requests import ClientDisconnect, Request
 from starlette.responses import RedirectResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from service.errors import (
-    BusyError,
-    InvalidError,
-    ServiceError,
-    TooLargeError,
-    TooManyError,
-    TooSlowError,
-    UnsupportedMediaTypeError,
-)
+from service.errors import BusyError, InvalidError, ServiceError, TooLargeError, TooManyError, UnsupportedMediaTypeError
 from service.logging import access, log_request, request_id, sane
 from service.web import limits
 from service.web.auth import UNMATCHED, authorise, clutch_of, context_of, query_fields, route_of, snapshot_at
-from service.web.files import PARQUET_TYPE
+from service.web.bodies import Room
 from service.web.metrics import Metrics
 from service.web.problems import refused, unexpected
 from storage.engine.errors import StorageError
@@ -121,96 +113,6 @@ class _Share:
     saved: float
     at: float
     running: int = 0
-
-
-class BodyLimit(_OfRequests):
-    """Refuses a body over the bytes of its address with 413, announced or grown so far, and one that takes longer than
-    `seconds`, and the time that its bytes so far may take, with 408.
-
-    One for which the bodies that are here leave no room is refused with 503. It is read to its end first, and thrown away:
-    a sender hears of it only then.
-    """
-
-    def __init__(self, app: ASGIApp, most: int, most_file: int, seconds: float) -> None:
-        super().__init__(app)
-        short = min(most, limits.MAX_SHORT_BODY_BYTES)
-        # by the end of an address: bytes of a body, and how many of them stay in memory where the rest is kept on disk
-        self.bounds = {
-            "/runs/file": (most_file, 0),
-            "/import/preview": (most_file, 0),
-            "/runs": (most, limits.MAX_BYTES_IN_MEMORY),
-            "/photographs": (most, most),
-            "": (short, short),
-        }
-        self.left = {"memory": limits.MAX_BODIES_IN_MEMORY, "disk": 2 * max(most, most_file)}
-        self.seconds = seconds
-
-    async def handle(self, scope: Scope, receive: Receive, send: Send) -> None:
-        bound, in_memory = next(bound for end, bound in self.bounds.items() if scope["path"].endswith(end))
-        detail = f"a request may hold at most {bound} bytes here"
-        announced = dict(scope["headers"]).get(b"content-length", b"0")
-        if announced.isdigit() and int(announced) > bound:
-            await refused(TooLargeError, detail)(scope, receive, send)
-            return
-        body = _Body(self.left, in_memory)
-        clock = asyncio.get_running_loop().time
-        begun, whole = clock(), False
-
-        async def arrived() -> Message:
-            left = begun + self.seconds + body.taken / limits.SLOWEST_BODY_BYTES_PER_SECOND - clock()
-            try:
-                async with asyncio.timeout(left):
-                    return await receive()
-            except TimeoutError:
-                raise TooSlowError(f"only {body.taken} bytes of the body arrived in {clock() - begun:.0f} s") from None
-
-        async def counted() -> Message:
-            nonlocal whole
-            if whole:  # what comes now is that the caller has gone
-                return await receive()
-            while True:
-                message = await arrived()
-                whole = not message.get("more_body", False)
-                has_room = body.grow(len(message.get("body", b"")))
-                if body.taken > bound:
-                    raise TooLargeError(detail)
-                if has_room:
-                    return message
-                if whole:
-                    raise BusyError("the bodies of other requests use all available room: try again later")
-
-        try:
-            await self.app(scope, counted, send)
-        finally:
-            body.leave()
-
-
-class _Body:
-    """The body of a request as far as it has arrived, and what it takes of the bytes `left` to all, by place."""
-
-    def __init__(self, left: dict[str, int], in_memory: int) -> None:
-        self.taken = 0
-        self._left, self._in_memory = left, in_memory
-        self._held = dict.fromkeys(left, 0)
-        self._has_room = True
-
-    def grow(self, size: int) -> bool:
-        """Whether so many bytes more have room; what has none takes none any more."""
-        self.taken += size
-        if self._has_room:
-            in_memory = min(self.taken, self._in_memory)
-            needed = {"memory": in_memory, "disk": self.taken - in_memory}
-            self._has_room = all(most <= self._left[place] + self._held[place] for place, most in needed.items())
-            self._hold(needed if self._has_room else dict.fromkeys(needed, 0))
-        return self._has_room
-
-    def leave(self) -> None:
-        self._hold(dict.fromkeys(self._held, 0))
-
-    def _hold(self, sizes: dict[str, int]) -> None:
-        for place, size in sizes.items():
-            self._left[place] += self._held[place] - size
-        self._held = sizes
 
 
 class Heads(_OfRequests):
@@ -362,33 +264,38 @@ def _arguments(route: Any, query: bytes) -> Hashable:
 
 #: The end of an entity tag of packed bytes.
 _PACKED = '-gzip"'
-#: Bytes that are unpacked at once. Chosen: a few of a socket's reads.
-_PIECE = 1 << 18
 #: zlib's word for the format: gzip, with the largest window.
 _GZIP = 16 + zlib.MAX_WBITS
 
 
 def _unpacked(receive: Receive) -> Receive:
-    """What receives a packed body unpacked. Raises InvalidError where it is no gzip, is cut off or goes on after its end."""
+    """What receives a packed body unpacked, piece by piece in a thread. Raises InvalidError where it is no gzip, is cut off
+    or goes on after its end, and TooLargeError where it holds more than `limits.MAX_RATIO` times its bytes.
+    """
     unpacker = zlib.decompressobj(_GZIP)
     packed, more, ended = b"", True, False
+    taken = given = 0
 
     async def receive_unpacked() -> Message:
         """The next piece of the body, unpacked; then what follows a body."""
-        nonlocal packed, more, ended
+        nonlocal packed, more, ended, taken, given
         while not ended:
             if not packed and more:
                 message = await receive()
                 if message["type"] != "http.request":
                     return message
                 packed, more = message.get("body", b""), message.get("more_body", False)
+            before = len(packed)
             try:
-                piece = unpacker.decompress(packed, _PIECE)
+                piece = await run_in_threadpool(unpacker.decompress, packed, limits.PIECE_BYTES)
             except zlib.error as error:
                 raise InvalidError(f"the body is not the gzip data that Content-Encoding announces: {error}") from error
             packed = unpacker.unconsumed_tail
+            taken, given = taken + before - len(packed), given + len(piece)
             if unpacker.unused_data:
                 raise InvalidError("the body has more bytes after the end of its gzip data")
+            if given > limits.PIECE_BYTES and given > limits.MAX_RATIO * taken:
+                raise TooLargeError(f"the body unpacks to more than {limits.MAX_RATIO} times its bytes: send it plain")
             ended = not piece and not packed and not more
             if ended and not unpacker.eof:
                 raise InvalidError("the gzip data of the body is cut off")
@@ -400,7 +307,8 @@ def _unpacked(receive: Receive) -> Receive:
 
 
 class Encodings(_OfRequests):
-    """Bodies packed by gzip, both ways, unless they are files that are packed already; any other encoding sent is a 415.
+    """Bodies packed by gzip, both ways, but for answers that say that they are packed already; any other encoding sent is a
+    415.
 
     An answer's entity tag names its bytes, so the packed ones have a tag of their own: the same with a mark.
     """
@@ -429,14 +337,63 @@ class Encodings(_OfRequests):
             if message["type"] == "http.response.start":
                 answered = MutableHeaders(scope=message)
                 tag = answered.get("etag", "").removesuffix('"') + _PACKED
-                packed = answered.get("content-encoding") == "gzip"
+                encoded = answered.get("content-encoding")
+                if encoded == "identity":  # the answer's own word that it is not to be packed
+                    del answered["content-encoding"]
+                packed = encoded == "gzip"
                 if "etag" in answered and (packed or (message["status"] == 304 and tag in wanted_tags)):
                     answered["etag"] = tag
             await send(message)
 
-        packed_by_itself = PARQUET_TYPE in headers.get("accept", "") or "/photographs/" in scope["path"]
-        app = self.app if packed_by_itself else self.packing
-        await app(scope, receive, tagged)
+        await self.packing(scope, receive, tagged)
+
+
+class Answers(_OfRequests):
+    """Hands long answers to the server in pieces, each when the reader has taken the one before; what readers hold of them
+    together has a room of its own. One that has no room there is refused with 503.
+
+    Readers of the same cached answer hold it once.
+    """
+
+    def __init__(self, app: ASGIApp) -> None:
+        super().__init__(app)
+        self.room = Room(limits.MAX_ANSWERS_IN_MEMORY)
+
+    async def handle(self, scope: Scope, receive: Receive, send: Send) -> None:
+        start: Message | None = None
+        is_refused = False
+
+        async def in_pieces(message: Message) -> None:
+            nonlocal start, is_refused
+            if message["type"] == "http.response.start":
+                start = message  # goes with the first bytes: until then the answer may become another
+            elif not is_refused:
+                content, more = message.get("body", b""), message.get("more_body", False)
+                if len(content) <= limits.PIECE_BYTES:
+                    await begin()
+                    await send(message)
+                    return
+                with self.room.sharing(content) as has_room:
+                    if start is not None and not has_room:
+                        is_refused = True
+                        await refused(
+                            BusyError, "the answers of other requests use all available room: try again later"
+                        )(scope, receive, send)
+                        return
+                    await begin()
+                    view = memoryview(content)
+                    for at in range(0, len(content), limits.PIECE_BYTES):
+                        piece = bytes(view[at : at + limits.PIECE_BYTES])
+                        goes_on = more or at + len(piece) < len(content)
+                        await send({"type": "http.response.body", "body": piece, "more_body": goes_on})
+
+        async def begin() -> None:
+            nonlocal start
+            if start is not None:
+                begun, start = start, None
+                await send(begun)
+
+        await self.app(scope, receive, in_pieces)
 
 
 class RootPath(_OfRequests):

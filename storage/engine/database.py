@@ -3,9 +3,12 @@
 Made by `opening`.
 """
 
+import asyncio
 import json
+import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
@@ -59,19 +62,74 @@ class Snapshot:
 
 
 class Watch(ABC):
-    """Answers the questions; threads share it."""
+    """Answers the questions; threads share it.
+
+    Those of the event loop are asked in a thread, one look for all who ask at that moment: whatever the database waits for,
+    the loop does not. No answer is older than its question: requests that come during a look share the next.
+    """
+
+    def __init__(self, name: str, patience: float) -> None:
+        self._name = name
+        self._patience = patience  # [s] for which a look may take before those who wait for it are told so
+        self._thread = ThreadPoolExecutor(1, thread_name_prefix="watch")
+        self._waiting: list[tuple[Question, asyncio.Future[Snapshot]]] = []
+        self._asking: asyncio.Task[None] | None = None
+        self._begun = 0.0  # when the look under way was begun, by the monotonic clock [s]
+        self._closed = False
 
     @abstractmethod
     def snapshots(self, questions: Sequence[Question]) -> list[Snapshot]:
         """Snapshots for several questions, all of the same moment."""
 
-    @abstractmethod
     async def look(self, question: Question) -> Snapshot:
-        """A snapshot for a caller on the event loop, which must not wait for another process."""
+        """A snapshot for a caller on the event loop. Raises StorageUnavailable where the database does not answer."""
+        self.refuse_closed()
+        answer: asyncio.Future[Snapshot] = asyncio.get_running_loop().create_future()
+        if self._asking is None:
+            self._begun = time.monotonic()
+            self._asking = asyncio.create_task(self._ask())
+        self._waiting.append((question, answer))
+        while not answer.done():
+            left = self._begun + self._patience - time.monotonic()
+            if left <= 0:
+                answer.cancel()
+                raise StorageUnavailable(f"{self._name} has not answered for {self._patience:g} s")
+            await asyncio.wait([answer], timeout=left)
+        return answer.result()
 
-    @abstractmethod
     def close(self) -> None:
-        """Ask nothing any more."""
+        """End the thread; who asks from then on is told that the database was closed. May be called twice."""
+        self._closed = True
+        self._thread.shutdown()
+
+    def refuse_closed(self) -> None:
+        if self._closed:
+            raise StorageUnavailable(f"{self._name} has been closed")
+
+    async def _ask(self) -> None:
+        """Ask for all who wait, until nobody does."""
+        try:
+            while self._waiting:
+                questions, self._waiting = self._waiting, []
+                self._begun = time.monotonic()
+                await self._ask_for(questions)
+        finally:
+            self._asking = None
+
+    async def _ask_for(self, questions: list[tuple[Question, asyncio.Future[Snapshot]]]) -> None:
+        try:
+            self.refuse_closed()
+            snapshots = await asyncio.get_running_loop().run_in_executor(
+                self._thread, self.snapshots, [question for question, _ in questions]
+            )
+        except Exception as error:  # noqa: BLE001  (raised again for each who asked)
+            for _, answer in questions:
+                if not answer.done():
+                    answer.set_exception(error)
+        else:
+            for (_, answer), snapshot in zip(questions, snapshots, strict=True):
+                if not answer.done():  # who asked may have gone
+                    answer.set_result(snapshot)
 
     def snapshot(self, clutch_id: str | None = None, secret_sha256: str | None = None) -> Snapshot:
         """A snapshot of one clutch and one key."""

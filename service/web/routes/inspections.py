@@ -4,7 +4,7 @@ from functools import partial
 
 from fastapi import APIRouter, Request
 from fastapi.concurrency import run_in_threadpool
-from fastapi.responses import Response
+from fastapi.responses import Response, StreamingResponse
 
 from service.errors import TooLargeError, UnsupportedMediaTypeError
 from service.queries import inspections
@@ -14,6 +14,9 @@ from service.schemas.parameters import ClutchId, InspectionId, PhotographId
 from service.schemas.run import Withdrawal
 from service.web import answers
 from service.web.auth import Ingester, Reader, grant_of
+from service.web.bodies import Takes, takes
+from service.web.files import PACKED
+from service.web.limits import PIECE_BYTES
 from service.web.problems import CHANGING, READING, SENDING
 from service.workflows import inspect_clutch
 from storage.runs import ACCEPTED, WITHDRAWN
@@ -103,6 +106,7 @@ async def restore_inspection(of: answers.ChangeOf, inspection_id: InspectionId) 
     responses=_SENDING_FILE,
     openapi_extra={"requestBody": {"required": True, "content": _FILES}},
 )
+@takes(Takes.PHOTOGRAPH)
 async def post_photograph(
     request: Request, context: Ingester, clutch_id: ClutchId, inspection_id: InspectionId
 ) -> Response:
@@ -119,13 +123,14 @@ async def read_photograph(
     request: Request, context: Reader, clutch_id: ClutchId, inspection_id: InspectionId, photograph_id: PhotographId
 ) -> Response:
     """The file of a photograph, as it was sent."""
-    wanted = (context.database, clutch_id, inspection_id, photograph_id)
-    media_type = await run_in_threadpool(inspections.media_type, *wanted)
+    photograph = await run_in_threadpool(
+        inspections.photograph, context.database, clutch_id, inspection_id, photograph_id
+    )
     headers = _OF_A_FILE | {"ETag": f'"{photograph_id}"'}
     if held := answers.unchanged(request, headers):
         return held
-    content = await run_in_threadpool(inspections.photograph, *wanted)
-    return Response(content=content, media_type=media_type, headers=headers)
+    headers |= PACKED | {"Content-Length": str(photograph.row.bytes)}
+    return StreamingResponse(photograph.pieces(PIECE_BYTES), media_type=photograph.row.media_type, headers=headers)
 
 
 def _media_type(request: Request) -> MediaType:

@@ -1,7 +1,6 @@
 """Rig profiles, and the preview of a file before it is sent."""
 
 import asyncio
-import tempfile
 from functools import partial
 from pathlib import Path
 
@@ -17,8 +16,9 @@ from service.schemas import parameters
 from service.schemas.rig import Preview, RigIn, RigOut, RigPage
 from service.web.answers import Paged, answer, json_answer, now, sent, taking
 from service.web.auth import Admin, Ingester, OwnIngester, OwnReader, grant_of, require_clutch
+from service.web.bodies import Takes, takes
 from service.web.context import Context
-from service.web.files import FILE_BODY, received
+from service.web.files import FILE_BODY, received, temporary_folder
 from service.web.problems import CHANGING, READING, SENDING
 from service.work.workers import Lane
 from service.workflows.save_rig import save
@@ -78,6 +78,7 @@ async def _saved(request: Request, context: Context, name: str | None) -> Respon
 
 
 @import_router.post("/preview", response_model=Preview, responses=CHANGING, openapi_extra=FILE_BODY)
+@takes(Takes.FILE)
 async def preview_file(
     request: Request,
     context: OwnIngester,
@@ -96,7 +97,7 @@ async def preview_file(
     """
     if clutch_id is not None:
         require_clutch(grant_of(request), clutch_id)
-    with tempfile.TemporaryDirectory(dir=context.folder) as folder:
+    async with temporary_folder(context.folder) as folder:
         path = Path(folder) / "run"
         filename, profile = await received(request, path, filename)
         computing = partial(

@@ -4,7 +4,6 @@ A file is the body itself, or a form with a `file` part; it is kept on disk whil
 """
 
 import asyncio
-import tempfile
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
@@ -25,6 +24,7 @@ from service.schemas.base import Origin
 from service.schemas.run import RUN_IN, Confirmation, Confirmations, Correction, Receipt, RunOut, RunPage, Withdrawal
 from service.web import answers, files
 from service.web.auth import Ingester, Reader, grant_of
+from service.web.bodies import Takes, takes
 from service.web.limits import LARGE_BODY_BYTES
 from service.web.problems import READING, SENDING, described
 from service.work.workers import Lane
@@ -45,6 +45,7 @@ SENDING_FILE = SENDING | described(NoRoomError)
     | {200: {"model": Receipt, "description": "The run was stored before; the answer is its receipt"}},
     openapi_extra=files.FILE_BODY,
 )
+@takes(Takes.FILE)
 async def post_run_file(
     request: Request,
     context: Ingester,
@@ -67,7 +68,7 @@ async def post_run_file(
     is kept as sent. A form may also hold a `profile` to read this file with.
     """
     profile = None if rig is None else await run_in_threadpool(rigs.rig_profile, context.database, rig)
-    with tempfile.TemporaryDirectory(dir=context.folder) as folder:
+    async with files.temporary_folder(context.folder) as folder:
         path = Path(folder) / "run"
         filename, content = await files.received(request, path, filename)
         read = partial(
@@ -102,11 +103,11 @@ async def read_run_file(of: answers.Of, run_id: parameters.RunId) -> Response:
     headers = {"Cache-Control": "no-cache", "ETag": f'"{sha256}"', "Content-Disposition": "attachment"}
     if held := answers.unchanged(of.request, headers):
         return held
-    with tempfile.TemporaryDirectory(dir=of.context.folder) as folder:
-        path = Path(folder) / "file"
-        await asyncio.wrap_future(of.context.workers.submit(Lane.RECORDS, copy_file, of.clutch_id, run_id, path))
-        body = path.open("rb")  # its name goes with the folder, its content when it is closed
-    return files.streamed(body, files.FILE_TYPE, headers)
+    submit = of.context.workers.submit
+    copy, _ = await of.context.copies.made(
+        lambda path: submit(Lane.RECORDS, partial(copy_file, path=path), of.clutch_id, run_id)
+    )
+    return copy.answer(files.FILE_TYPE, headers)
 
 
 _PARQUET = {"schema": {"type": "string", "format": "binary"}}
@@ -135,6 +136,7 @@ EXAMPLE = {
         RUN_IN.json_schema(), Receipt, EXAMPLE, SENDING, {200: "The run was stored before; the answer is its receipt"}
     ),
 )
+@takes(Takes.RUN)
 async def post_run(request: Request, context: Ingester, clutch_id: parameters.ClutchId) -> Response:
     """Post a run, in any order of cycles. The receipt has the results. When you get it, the run is stored for good."""
     answers.require_json(request)
@@ -180,12 +182,11 @@ async def read_run_with_channels(
     )
     if held := answers.unchanged(request, headers):
         return held
-    with tempfile.TemporaryDirectory(dir=context.folder) as folder:
-        path = Path(folder) / "body"
-        write = partial(write_run, points=points, kind=kind, path=path, compressed=packed)
-        headers["ETag"] = await asyncio.wrap_future(context.workers.submit(Lane.RECORDS, write, clutch_id, run_id))
-        body = path.open("rb")  # its name goes with the folder, its content when it is closed
-    return files.streamed(body, media_type, headers)
+    write, submit = partial(write_run, points=points, kind=kind, compressed=packed), context.workers.submit
+    copy, headers["ETag"] = await context.copies.made(
+        lambda path: submit(Lane.RECORDS, partial(write, path=path), clutch_id, run_id)
+    )
+    return copy.answer(media_type, headers | (files.PACKED if kind == "parquet" else {}))
 
 
 @router.patch("/{run_id}", **answers.taking(Correction, Receipt, {"cycles": 7000, "reason": "typed a zero too many"}))

@@ -4,14 +4,10 @@ Writers of one clutch queue for a lock of that clutch, so that its rows are comm
 get (revisions, keys); those of different clutches write at once. Who writes of all clutches together waits for all of them.
 `commits`, the number of all, is given last: from then until it is committed a transaction holds that row.
 
-`ServerWatch` asks one statement for all requests, so that no answer is older than its question: one is under way in a
-thread, and requests that come meanwhile share the next. Computed answers are in a table that is not logged: a server that
-crashes empties it, and they are computed again.
+Computed answers are in a table that is not logged: a server that crashes empties it, and they are computed again.
 """
 
-import asyncio
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing, contextmanager, nullcontext
 from typing import Literal
 
@@ -62,14 +58,11 @@ SELECT (SELECT number FROM commits) AS version,
 
 
 class ServerWatch(Watch):
-    """The questions, one at a time for all who ask from the event loop."""
+    """One statement for all who ask."""
 
-    def __init__(self, statements: connect.SingleStatements) -> None:
+    def __init__(self, statements: connect.SingleStatements, name: str, patience: float) -> None:
+        super().__init__(name, patience)
         self._statements = statements
-        self._thread = ThreadPoolExecutor(1, thread_name_prefix="watch")
-        self._waiting: list[tuple[Question, asyncio.Future[Snapshot]]] = []
-        self._asking: asyncio.Task[None] | None = None
-        self._closed = False
 
     def snapshots(self, questions: Sequence[Question]) -> list[Snapshot]:
         # no clutch is named by what the server cannot store
@@ -92,47 +85,6 @@ class ServerWatch(Watch):
             )
             for question in questions
         ]
-
-    async def look(self, question: Question) -> Snapshot:
-        self._refuse_closed()
-        answer: asyncio.Future[Snapshot] = asyncio.get_running_loop().create_future()
-        self._waiting.append((question, answer))
-        if self._asking is None:
-            self._asking = asyncio.create_task(self._ask())
-        return await answer
-
-    def close(self) -> None:
-        """End the thread; who asks from then on is told that the database was closed. May be called twice."""
-        self._closed = True
-        self._thread.shutdown()
-
-    async def _ask(self) -> None:
-        """Ask for all who wait, until nobody does."""
-        try:
-            while self._waiting:
-                questions, self._waiting = self._waiting, []
-                await self._ask_for(questions)
-        finally:
-            self._asking = None
-
-    async def _ask_for(self, questions: list[tuple[Question, asyncio.Future[Snapshot]]]) -> None:
-        try:
-            self._refuse_closed()
-            snapshots = await asyncio.get_running_loop().run_in_executor(
-                self._thread, self.snapshots, [question for question, _ in questions]
-            )
-        except Exception as error:  # noqa: BLE001  (raised again for each who asked)
-            for _, answer in questions:
-                if not answer.done():
-                    answer.set_exception(error)
-        else:
-            for (_, answer), snapshot in zip(questions, snapshots, strict=True):
-                if not answer.done():  # who asked may have gone
-                    answer.set_result(snapshot)
-
-    def _refuse_closed(self) -> None:
-        if self._closed:
-            raise StorageUnavailable("the database has been closed")
 
 
 #: A transaction that changed nothing has no number and is not counted.
@@ -164,7 +116,7 @@ class ServerDatabase(Database):
             connect.SingleStatements(watching, self.name),
             connect.SingleStatements(sharing, self.name),
         )
-        self.watch = ServerWatch(self._watching)
+        self.watch = ServerWatch(self._watching, self.name, lock_timeout)
 
     @contextmanager
     def _read(self) -> Iterator[sa.Connection]:

@@ -55,14 +55,14 @@ _KEY = "SELECT key_id, scope, note, clutches, expires_at FROM access_key WHERE s
 
 
 class FileWatch(Watch):
-    """A connection of its own, shared by threads. With a write-ahead log it waits for nobody."""
+    """A connection of its own, shared by threads. With a write-ahead log it waits for nobody but the disk."""
 
     def __init__(self, path: Path, lock_timeout: float, *, writable: bool = True) -> None:
+        super().__init__(f"the database {path}", lock_timeout)
         self._path = path
         self._lock = threading.Lock()
         self._rows: dict[tuple[str, tuple[object, ...]], tuple[Any, ...] | None] = {}
         self._rows_version = -1
-        self._closed = False
         self._connection = connect.connect_shared(path, lock_timeout, writable=writable)
 
     def snapshots(self, questions: Sequence[Question]) -> list[Snapshot]:
@@ -72,10 +72,6 @@ class FileWatch(Watch):
                 self._rows.clear()
                 self._rows_version = version
             return [self._snapshot(version, question) for question in questions]
-
-    async def look(self, question: Question) -> Snapshot:
-        """A snapshot for a caller on the event loop: the file answers at once."""
-        return self.snapshots([question])[0]
 
     def _snapshot(self, version: int, question: Question) -> Snapshot:
         """What the rest of a request relies on: whether keys are needed, what its key grants, its clutch's revision, all at
@@ -98,8 +94,8 @@ class FileWatch(Watch):
         return self._rows[key]
 
     def close(self) -> None:
+        super().close()
         with self._lock:
-            self._closed = True
             self._connection.close()
 
     def _version(self) -> int:
@@ -107,8 +103,7 @@ class FileWatch(Watch):
         return 0 if row is None else int(row[0])
 
     def _first(self, query: str, values: tuple[object, ...]) -> tuple[Any, ...] | None:
-        if self._closed:
-            raise StorageUnavailable(f"the database {self._path} has been closed")
+        self.refuse_closed()
         with connect.translated(self._path):
             # fetched to the end: an open statement would keep the log from being written back
             rows = self._connection.execute(query, values).fetchall()

@@ -161,3 +161,44 @@ def test_a_connection_stays_usable_after_head(tmp_path: Path) -> None:
             assert (head.status_code, head.content) == (200, b"")
             assert int(head.headers["content-length"]) > 0
             assert http.get("/v1/clutches").json() == {"items": [], "next": None}
+
+
+async def seconds_until_cut_off(pause: float, reads: int, window: int) -> float:
+    """When the server cuts off who asks for 64 MiB in pieces that may take half a second each, and reads one a pause."""
+    ended = asyncio.Event()
+
+    async def answer(_scope: Scope, _receive: Receive, send: Send) -> None:
+        await send({"type": "http.response.start", "status": 200, "headers": [(b"content-length", b"%d" % (64 << 20))]})
+        for number in range(256):
+            await send({"type": "http.response.body", "body": b"a" * (1 << 18), "more_body": number < 255})
+        ended.set()
+
+    config = Config(log_config=None, app=answer, http=bounded(9, taken_seconds=0.5), lifespan="off")
+    config.load()
+    loop = asyncio.get_running_loop()
+    factory: Any = config.http_protocol_class
+    state = ServerState()
+    server = await loop.create_server(lambda: factory(config=config, server_state=state, app_state={}), "127.0.0.1", 0)
+    async with server:
+        with socket.socket() as line:
+            line.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, window)
+            line.connect(server.sockets[0].getsockname())
+            line.sendall(WHOLE)
+            begun = loop.time()
+            for _ in range(reads):
+                await asyncio.sleep(pause)
+                left = 1 << 18
+                while left > 0 and (taken := await asyncio.to_thread(line.recv, left)):
+                    left -= len(taken)
+                assert not ended.is_set(), "it reads"
+            await asyncio.wait_for(ended.wait(), 10)
+            return loop.time() - begun
+
+
+def test_a_reader_that_takes_nothing_is_cut_off() -> None:
+    """It held its answer as long as it liked."""
+    assert 0.4 < asyncio.run(seconds_until_cut_off(0.0, 0, 1 << 12)) < 3
+
+
+def test_a_reader_that_takes_its_pieces_slowly_is_not_cut_off() -> None:
+    assert asyncio.run(seconds_until_cut_off(0.2, 8, 1 << 18)) > 1.6

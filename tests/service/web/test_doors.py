@@ -1,27 +1,38 @@
 """Whoever sends much, and whatever hangs, takes the service from nobody: bodies share room, hung processes are replaced."""
 
+import asyncio
+import gzip
 import os
 import signal
 import threading
 import time
+import zlib
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
+from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
+from unittest.mock import AsyncMock
 
 import httpx2
 import pytest
 from fastapi.testclient import TestClient
 
 from service.queries import scores
-from service.web import limits
+from service.queries.raw_run import copy_file
+from service.web import bodies, files, limits
+from service.web.bodies import Takes
 from service.web.files import emptied_folder
-from service.web.routes import runs
+from service.web.middleware import Answers
+from service.web.routes import inspections, rigs, runs
+from service.work.workers import Lane
 from storage.encoding import to_text
 from tests.benchmarks.memory import family, resident
 from tests.service.clients import client_on, csv_text
 from tests.service.web.routes.granting import context_of
+from tests.service.work.waiting import until
 from tests.support import ONCE, serving, stationary
 
 RUNS = "/v1/clutches/c1/runs"
@@ -106,6 +117,177 @@ def test_bodies_for_which_there_is_no_room_are_refused_with_503_and_room_comes_b
     for number in range(5):
         body = to_text({"clutch_id": f"d{number}"}).encode().ljust(90_000)
         assert small.post("/v1/clutches", content=body, headers=JSON).status_code == 201
+
+
+@pytest.mark.parametrize(
+    ("method", "path"),
+    [
+        ("PATCH", "/v1/clutches/runs"),
+        ("PATCH", "/v1/clutches/photographs"),
+        ("PUT", "/v1/rigs/runs"),
+        ("PATCH", "/v1/clutches/c1/runs/file"),
+        ("POST", "/v1/clutches/runs/runs/file/withdraw"),
+    ],
+)
+def test_no_name_lifts_the_bound_of_a_body(client: TestClient, method: str, path: str) -> None:
+    """A clutch called `runs` might send 64 MiB, a run called `file` 1 GiB: the bound was chosen by the end of the path."""
+    assert client.post("/v1/clutches", json={"clutch_id": "runs"}).status_code == 201
+    answer = client.request(method, path, content=b"{" + b" " * 2**18, headers=JSON)
+    assert (answer.status_code, answer.json()["detail"]) == (413, f"a request may hold at most {2**18} bytes here")
+
+
+def test_each_route_declares_what_it_takes_and_the_others_take_little() -> None:
+    routes = [(route.path, takes) for endpoint, takes in bodies.declared.items() for route in _routes_of(endpoint)]
+    assert sorted(routes, key=str) == [
+        ("/v1/clutches/{clutch_id}/inspections/{inspection_id}/photographs", Takes.PHOTOGRAPH),
+        ("/v1/clutches/{clutch_id}/runs", Takes.RUN),
+        ("/v1/clutches/{clutch_id}/runs/file", Takes.FILE),
+        ("/v1/import/preview", Takes.FILE),
+    ]
+
+
+def _routes_of(endpoint: Any) -> list[Any]:
+    routers = (runs.router, inspections.router, rigs.import_router)
+    return [route for router in routers for route in router.routes if getattr(route, "endpoint", None) is endpoint]
+
+
+@pytest.mark.parametrize("size", [1 << 12, 1 << 17], ids=["short", "long"])
+def test_a_long_body_is_not_checked_on_the_event_loop(
+    client: TestClient, monkeypatch: pytest.MonkeyPatch, size: int
+) -> None:
+    on_loop: list[bool] = []
+    check = bodies.checked
+
+    def noted(*arguments: Any) -> Any:
+        try:
+            asyncio.get_running_loop()
+            on_loop.append(True)
+        except RuntimeError:
+            on_loop.append(False)
+        return check(*arguments)
+
+    monkeypatch.setattr(bodies, "checked", noted)
+    body = to_text({"clutch_id": "d1"}).encode().ljust(size)
+    assert client.post("/v1/clutches", content=body, headers=JSON).status_code == 201
+    assert on_loop == [size <= limits.MAX_CHECKED_BYTES]
+
+
+def test_what_unpacks_to_more_than_200_times_its_bytes_is_refused(client: TestClient) -> None:
+    """1 MiB unpacked to 1 GiB, on the event loop."""
+    packed = JSON | {"Content-Encoding": "gzip"}
+    bomb = client.post(ADDRESS, content=gzip.compress(b"\0" * (8 << 20)), headers=packed)
+    assert bomb.status_code == 413
+    assert bomb.json()["detail"] == "the body unpacks to more than 200 times its bytes: send it plain"
+    assert list(context_of(client).folder.iterdir()) == []
+    run = gzip.compress(padded(0.0, limits.PIECE_BYTES))
+    assert client.post(RUNS, content=run, headers=packed).status_code == 201, "a short one may be of blanks"
+
+
+def test_a_body_is_unpacked_in_a_thread_piece_by_piece(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
+    made = zlib.decompressobj
+    pieces: list[tuple[bool, int]] = []
+
+    class Noted:
+        def __init__(self, form: int) -> None:
+            self._of = made(form)
+
+        def __getattr__(self, name: str) -> Any:
+            return getattr(self._of, name)
+
+        def decompress(self, packed: bytes, most: int) -> bytes:
+            piece = self._of.decompress(packed, most)
+            pieces.append((threading.current_thread().name.startswith("AnyIO"), len(piece)))
+            return piece
+
+    monkeypatch.setattr("service.web.middleware.zlib.decompressobj", Noted)
+    text = "\n".join(f"{number % 977:03}" for number in range(250_000)).encode()
+    answer = client.post(ADDRESS, content=gzip.compress(text), headers={"Content-Encoding": "gzip"})
+    assert answer.status_code == 422
+    assert all(in_thread for in_thread, _ in pieces)
+    assert max(size for _, size in pieces) == limits.PIECE_BYTES
+
+
+# --- What is sent is counted as what comes in is, and a disk that hangs holds up nobody who does not need it.
+
+
+async def answered(room: int, contents: list[bytes]) -> list[int]:
+    """The statuses of answers, of which as many bytes have room; their readers have begun to read, and stopped."""
+    statuses: list[int] = []
+    taken = asyncio.Event()
+
+    async def app(scope: Any, _receive: Any, send: Any) -> None:
+        await send({"type": "http.response.start", "status": 200, "headers": []})
+        await send({"type": "http.response.body", "body": contents[scope["number"]]})
+
+    async def send(message: Any) -> None:
+        if message["type"] == "http.response.start":
+            statuses.append(message["status"])
+        else:
+            assert len(message["body"]) <= limits.PIECE_BYTES
+            await taken.wait()
+
+    answers = Answers(app)
+    answers.room = bodies.Room(room)
+    async with asyncio.TaskGroup() as group:
+        for number in range(len(contents)):
+            group.create_task(answers({"type": "http", "number": number}, AsyncMock(), send))
+        await asyncio.sleep(0.01)
+        assert len(statuses) == len(contents)
+        taken.set()
+    assert answers.room.left == room
+    return statuses
+
+
+def test_answers_that_nobody_reads_share_room_and_the_same_one_is_held_once() -> None:
+    """120 readers of 16 MiB held 2 GiB."""
+    size, each = 1 << 20, [bytes([number]) * (1 << 20) for number in range(4)]
+    assert sorted(asyncio.run(answered(2 * size, each))) == [200, 200, 503, 503]
+    assert asyncio.run(answered(size, [each[0]] * 120)) == [200] * 120
+    assert asyncio.run(answered(0, [b"short"] * 9)) == [200] * 9
+
+
+def test_copies_of_runs_share_the_room_on_the_disk(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Sixty readers of a file of 14 MiB filled a disk of 1 GiB."""
+    assert client.post(f"{ADDRESS}&run_id=a", content=TEXT).status_code == 201
+    copies = context_of(client).copies
+    address = f"{RUNS}/a/file"
+    assert client.get(address).text == TEXT
+    free = 3 * len(TEXT)
+    monkeypatch.setattr("service.web.files.shutil.disk_usage", lambda _: SimpleNamespace(free=free))
+    made = [asyncio.run(copies.made(partial(submitted, client)))[0] for _ in range(2)]
+    free = len(TEXT)
+    for path in (address, f"{RUNS}/a"):
+        refused = client.get(path)
+        assert (refused.status_code, refused.headers["Retry-After"]) == (503, "1")
+        assert "copies of runs" in refused.json()["detail"]
+    for copy in made:
+        copy.close()
+    free = 4 * len(TEXT)
+    assert client.get(address).text == TEXT
+    assert list(context_of(client).folder.iterdir()) == []
+
+
+def submitted(client: TestClient, path: Path) -> Any:
+    return context_of(client).workers.submit(Lane.RECORDS, partial(copy_file, path=path), "c1", "a")
+
+
+def test_a_disk_that_does_not_answer_holds_up_no_probe(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The event loop itself waited for it, and nobody was answered."""
+    watch, hangs = context_of(client).database.watch, threading.Event()
+    version = watch._version
+    monkeypatch.setattr(watch, "_version", lambda: hangs.wait(30) and version())
+    monkeypatch.setattr(watch, "_patience", 0.5)
+    with ThreadPoolExecutor(4) as pool:
+        waiting = [pool.submit(client.get, "/v1/clutches") for _ in range(4)]
+        time.sleep(0.1)
+        begun = time.monotonic()
+        assert client.get("/livez").status_code == 200
+        assert time.monotonic() - begun < 0.3
+        assert client.get("/readyz").status_code == 200
+        assert {answer.result().status_code for answer in waiting} == {503}
+        assert client.get("/v1/clutches").status_code == 503, "and at once: it still has not answered"
+    hangs.set()
+    until(lambda: client.get("/v1/clutches").status_code == 200)
 
 
 def test_scores_of_the_fleet_are_computed_by_workers(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -197,7 +379,7 @@ def full(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
             (place / "run").unlink()
             place.rmdir()
 
-    monkeypatch.setattr(runs.tempfile, "TemporaryDirectory", folder)
+    monkeypatch.setattr(files.tempfile, "TemporaryDirectory", folder)
 
 
 def test_a_file_for_which_the_disk_has_no_room_is_refused_with_the_reason(

@@ -121,7 +121,7 @@ class Slow(ServerWatch):
     """A server that answers when it is let: the number of the statement is the version."""
 
     def __init__(self) -> None:
-        super().__init__(SingleStatements(create_engine("postgresql+psycopg://"), "slow"))
+        super().__init__(SingleStatements(create_engine("postgresql+psycopg://"), "slow"), "slow", 30.0)
         self.statements: list[list[Question]] = []
         self.may_answer = threading.Semaphore(0)
         self.fails = False

@@ -1,0 +1,187 @@
+"""Bodies of requests: what a route takes, what all may hold together, and how long one may take.
+
+A route that takes more than short JSON says so where it stands (`takes`); what is not declared is short. Bytes are counted
+while they are held: what has no room is refused with 503.
+"""
+
+import asyncio
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any, TypeVar
+
+from fastapi.concurrency import run_in_threadpool
+from pydantic import BaseModel
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from service.errors import BusyError, TooLargeError, TooSlowError
+from service.run_files.json_run import checked
+from service.web import limits
+
+Endpoint = TypeVar("Endpoint", bound=Callable[..., Any])
+
+
+class Takes(Enum):
+    """What a route takes as its body."""
+
+    SHORT = "JSON of a few fields"
+    RUN = "a run as JSON, which waits on disk where it is long"
+    PHOTOGRAPH = "a photograph, in memory"
+    FILE = "a file, on disk"
+
+
+#: What routes' functions take that is not short JSON.
+declared: dict[Callable[..., Any], Takes] = {}
+
+
+def takes(kind: Takes) -> Callable[[Endpoint], Endpoint]:
+    """Declare of a route's function what it takes as its body."""
+
+    def declare(endpoint: Endpoint) -> Endpoint:
+        declared[endpoint] = kind
+        return endpoint
+
+    return declare
+
+
+Content = TypeVar("Content", bound=BaseModel)
+
+
+async def parsed(schema: type[Content], body: bytes) -> Content:
+    """A body of JSON checked by its schema, a long one in a thread. Raises InvalidError, which names every wrong place."""
+    if len(body) <= limits.MAX_CHECKED_BYTES:
+        return checked(schema, body)
+    return await run_in_threadpool(checked, schema, body)
+
+
+class Room:
+    """Bytes that requests may hold together."""
+
+    def __init__(self, most: int) -> None:
+        self.left = most
+        self._sharing: dict[int, int] = {}  # how many hold the same object, by its id
+
+    def take(self, size: int) -> bool:
+        """Hold so many bytes more (fewer where negative), unless they have no room; whether they are held."""
+        if size > self.left:
+            return False
+        self.left -= size
+        return True
+
+    @contextmanager
+    def sharing(self, content: bytes) -> Iterator[bool]:
+        """Hold an object's bytes inside, once for all who hold the same object; whether they have room."""
+        held = id(content) in self._sharing or self.take(len(content))
+        if held:
+            self._sharing[id(content)] = self._sharing.get(id(content), 0) + 1
+        try:
+            yield held
+        finally:
+            if held:
+                self._sharing[id(content)] -= 1
+                if not self._sharing[id(content)]:
+                    del self._sharing[id(content)]
+                    self.take(-len(content))
+
+
+@dataclass(frozen=True, slots=True)
+class Bound:
+    """Bytes that a body may have, and how many of them are in memory; the rest is on disk."""
+
+    most: int
+    in_memory: int
+
+
+class Bodies:
+    """Refuses a body over the bytes that its route takes with 413, announced or grown so far, and one that takes longer than
+    `seconds`, and the time that its bytes so far may take, with 408.
+
+    One for which the bodies that are here leave no room is refused with 503. It is read to its end first, and thrown away:
+    a sender hears of it only then.
+    """
+
+    def __init__(self, app: ASGIApp, most: int, most_file: int, seconds: float) -> None:
+        self.app = app
+        short = min(most, limits.MAX_SHORT_BODY_BYTES)
+        self.bounds: Mapping[Takes, Bound] = {
+            Takes.SHORT: Bound(short, short),
+            Takes.RUN: Bound(most, limits.MAX_BYTES_IN_MEMORY),
+            Takes.PHOTOGRAPH: Bound(most, most),
+            Takes.FILE: Bound(most_file, 0),
+        }
+        self.rooms = {"memory": Room(limits.MAX_BODIES_IN_MEMORY), "disk": Room(2 * max(most, most_file))}
+        self.seconds = seconds
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] != "http":
+            await self.app(scope, receive, send)
+            return
+        body = _Body(self.rooms)
+        begun: float | None = None
+        whole = False
+        clock = asyncio.get_running_loop().time
+
+        async def arrived(begun: float) -> Message:
+            left = begun + self.seconds + body.taken / limits.SLOWEST_BODY_BYTES_PER_SECOND - clock()
+            try:
+                async with asyncio.timeout(left):
+                    return await receive()
+            except TimeoutError:
+                raise TooSlowError(f"only {body.taken} bytes of the body arrived in {clock() - begun:.0f} s") from None
+
+        async def counted() -> Message:
+            nonlocal begun, whole
+            if whole:  # what comes now is that the caller has gone
+                return await receive()
+            bound = self.bounds[declared.get(scope.get("endpoint", self), Takes.SHORT)]
+            too_large = TooLargeError(f"a request may hold at most {bound.most} bytes here")
+            if begun is None:
+                begun = clock()
+                announced = dict(scope["headers"]).get(b"content-length", b"0")
+                if announced.isdigit() and int(announced) > bound.most:
+                    raise too_large
+            while True:
+                message = await arrived(begun)
+                whole = not message.get("more_body", False)
+                has_room = body.grow(len(message.get("body", b"")), bound.in_memory)
+                if body.taken > bound.most:
+                    raise too_large
+                if has_room:
+                    return message
+                if whole:
+                    raise BusyError("the bodies of other requests use all available room: try again later")
+
+        try:
+            await self.app(scope, counted, send)
+        finally:
+            body.leave()
+
+
+class _Body:
+    """The body of a request as far as it has arrived, and what it takes of the rooms by place."""
+
+    def __init__(self, rooms: Mapping[str, Room]) -> None:
+        self.taken = 0
+        self._rooms = rooms
+        self._held = dict.fromkeys(rooms, 0)
+        self._has_room = True
+
+    def grow(self, size: int, in_memory: int) -> bool:
+        """Whether so many bytes more have room; what has none takes none any more."""
+        self.taken += size
+        if self._has_room:
+            needed = {"memory": min(self.taken, in_memory), "disk": max(0, self.taken - in_memory)}
+            self._has_room = all(self._hold(place, size) for place, size in needed.items())
+            if not self._has_room:
+                self.leave()
+        return self._has_room
+
+    def leave(self) -> None:
+        for place in self._held:
+            self._hold(place, 0)
+
+    def _hold(self, place: str, size: int) -> bool:
+        has_room = self._rooms[place].take(size - self._held[place])
+        self._held[place] = size if has_room else self._held[place]
+        return has_room
