@@ -23,7 +23,7 @@
 # make mutants  puts small faults into the product, each into a copy, and counts those that the tests of its folder find
 #              (SEED= COUNT= ONLY= STORE=)
 # make load     rigs and clients against a running service, what they wait and what is lost: a table of docs/appendix/benchmarks.md
-#              (ARGS="--seconds 60 --no-raw"; "--services 4 --database postgresql --rigs 16 --clients 40 --no-raw"); a few
+#              (ARGS="--seconds 60 --no-raw"; "--slow 60"; "--services 4 --database postgresql --rigs 16 --clients 40 --no-raw"); a few
 #              minutes, on a machine that does nothing else
 # make scale    requests and commands with 1,000 clutches of 200 tests in one file, beside 10: a table of docs/appendix/scale.md
 #              (ARGS="--clutches 10000 --states 5"); needs 7 GB of disk. python -m tests.scale.replay --clutches 300: a replay

@@ -131,6 +131,10 @@ class BusyError(ServiceError, status=503, slug="busy", title="Busy"):
     """Too many requests of this kind wait. Repeat the request later."""
 
 
+class DamagedError(ServiceError, status=503, slug="damaged", title="What is stored is damaged"):
+    """A stored value fails its checksum. Results are mended by `clutchlife replay`, what was sent by a backup."""
+
+
 class UnauthorizedError(ServiceError, status=401, slug="unauthorized", title="A valid key is needed"):
     """A key is needed and no valid one was sent."""
 

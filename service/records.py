@@ -6,6 +6,7 @@ A workflow reads a `ClutchState`, computes outside any transaction, and stores w
 from __future__ import annotations
 
 import json
+import logging
 import secrets
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -39,10 +40,12 @@ from service.schemas.inspection import InspectionOut, PhotographOut
 from service.schemas.rig import RigOut
 from service.settings import CODE_VERSION
 from storage import assumptions, changes, clutches, diagnoses, inspections, jobs, results, rigs, runs
+from storage.checksums import allow_damage
 from storage.clutches import ClutchRow
 from storage.diagnoses import DiagnosisRow, VerdictRow
 from storage.encoding import Json
 from storage.engine.database import Database
+from storage.engine.errors import DamagedData
 from storage.inspections import InspectionRow, PhotographRow
 from storage.jobs import JobRow
 from storage.results import FilterStateRow, FitRow, PredictionRow
@@ -51,6 +54,8 @@ from storage.runs import RunInOrder, RunRow
 
 if TYPE_CHECKING:
     from models.diagnosis.extension import Extension
+
+_log = logging.getLogger("clutchlife")
 
 #: How often what depends on a clutch's history is computed where others change it meanwhile. Derived: beside three services
 #: that change it all the time, each as often as this one, one in a hundred gives up (0.75^16).
@@ -104,6 +109,7 @@ def state(
     edited: ClutchIn | None = None,
     carried: bool = False,
     newest_prior: bool = False,
+    damaged: bool = False,
 ) -> ClutchState:
     """The clutch's state at its present revision. Raises NotFoundError.
 
@@ -111,14 +117,19 @@ def state(
     `edited`: a record that is about to come into force in place of the stored one.
     `carried`: with the filters after the last run, to be carried on; all else is computed without them.
     `newest_prior`: under what its fleet knows now; else a clutch stays under the version that it was tracked under last.
+    `damaged`: what follows from its runs may be damaged and is computed again; its record must not be.
     """
+    if damaged:
+        allow_damage(connection)
     row = clutch(connection, clutch_id)
+    if damaged and content_of(row.record) != row.content_sha256:
+        raise DamagedData(f"the record of clutch {clutch_id!r} is damaged: restore a backup")
     own, adoptions = edited or record(row), _adoptions(connection, clutch_id)
     extensions = [also, *(None if adopted is None else adopted.extension for adopted in adoptions)]
     exponents = {None, *(extension.severity_exponent for extension in extensions if extension is not None)}
     severities = {severity_under(own, exponent) for exponent in exponents}
     last = results.prediction_at(connection, clutch_id, CARRIED[0], ALL_PRESSURES)
-    tracked = {} if last is None or newest_prior or edited is not None else last.payload
+    tracked = {} if last is None or newest_prior or damaged or edited is not None else last.payload
     return ClutchState(
         record=own,
         revision=row.revision,
@@ -127,7 +138,7 @@ def state(
         priors={severity: _learned_prior(connection, own, severity, tracked) for severity in severities},
         filters=_filters(connection, clutch_id) if carried else None,
         held=held(connection, clutch_id),
-        summary=row.summary,
+        summary={} if damaged else row.summary,
     )
 
 
@@ -258,12 +269,17 @@ def attempts(clutch_id: str) -> Iterator[int]:
     )
 
 
-def replace_results(database: Database, state: ClutchState, computed: Results) -> bool:
+def replace_results(database: Database, state: ClutchState, computed: Results, *, damaged: bool = False) -> bool:
     """Store a clutch's results where its revision still is that of the state they follow from; whether it was. The revision
-    moves on where an answer changes."""
+    moves on where an answer changes, or where what is replaced may be `damaged`."""
     with database.writing() as connection:
+        if damaged:
+            allow_damage(connection)
         is_unchanged = unchanged(connection, state.clutch_id, state.revision)
-        if is_unchanged:
+        if is_unchanged and damaged:
+            store(connection, state.clutch_id, computed)
+            clutches.bump_revision(connection, state.clutch_id)
+        elif is_unchanged:
             before = answers(connection, state.clutch_id)
             store(connection, state.clutch_id, computed)
             if answers(connection, state.clutch_id) != before:
@@ -337,7 +353,11 @@ def _store_tracking(connection: Connection, clutch_id: str, tracking: Tracking) 
 
 
 def _filters(connection: Connection, clutch_id: str) -> States | None:
-    rows = {method: row for (method, _), row in results.filter_states_of(connection, clutch_id).items()}
+    try:
+        rows = {method: row for (method, _), row in results.filter_states_of(connection, clutch_id).items()}
+    except DamagedData as error:
+        _log.warning("%s: the clutch is tracked again from its runs", error)
+        return None
     if any(row.code_version != CODE_VERSION for row in rows.values()):
         return None
     return {method: Tracked.from_arrays(method, row.runs, row.arrays) for method, row in rows.items()}

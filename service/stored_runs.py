@@ -2,6 +2,7 @@
 and all results of a clutch computed again from its runs.
 """
 
+import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -16,7 +17,7 @@ from service.columns import whole
 from service.errors import InvalidError, NotFoundError
 from service.lives.engagements import DUTY_KINDS, StoredEngagement, stored_engagement
 from service.lives.history import Event, order, stationary_tests_of
-from service.lives.incoming_run import IncomingRun
+from service.lives.incoming_run import IncomingRun, content_hash
 from service.lives.model_correction import RunReader
 from service.lives.outlook import Evidence, engagement_rows, needs_evidence, summarised
 from service.lives.payloads import receipt
@@ -26,9 +27,12 @@ from service.lives.run_analysis import analyse
 from service.schemas.clutch import ClutchIn
 from storage import channels, runs
 from storage.blobs import raw_stores
+from storage.checksums import allow_damage
 from storage.engine.database import Database
 from storage.engine.errors import DamagedData
 from storage.runs import RunRow
+
+_log = logging.getLogger("clutchlife")
 
 
 def evidence(connection: Connection, clutch_id: str) -> Evidence:
@@ -77,16 +81,20 @@ def run(connection: Connection, clutch_id: str, run_id: str) -> RunRow:
     return row
 
 
-def run_reader(database: Database, clutch_id: str) -> RunReader:
+def run_reader(database: Database, clutch_id: str, *, damaged: bool = False) -> RunReader:
     """The clutch's stored runs, each read in a transaction of its own when it is asked for: none stays open meanwhile."""
 
     def read(run_id: str, *, whole: bool = True) -> IncomingRun:
         with database.reading() as connection:
+            if damaged:
+                allow_damage(connection)
             row = run(connection, clutch_id, run_id)
             columns = channels.stored_of_run(connection, row.run_key) if whole else ()
         return decoded(row, columns)
 
     with database.reading() as connection:
+        if damaged:
+            allow_damage(connection)
         record = records.record(records.clutch(connection, clutch_id))
         sampled = channels.samples(connection, clutch_id)
         names = runs.keys(connection, clutch_id)
@@ -136,6 +144,25 @@ def decoded(row: RunRow, columns: Sequence[channels.Stored]) -> IncomingRun:
         raise DamagedData(f"run {row.run_id} is damaged: {error}") from error
 
 
+def content_now(row: RunRow, sent: IncomingRun) -> str:
+    """The hash of what is stored of a run, to be compared with the one that its sender was given."""
+    sha256 = content_hash(replace(sent, cycles=row.cycles if row.sent_cycles is None else row.sent_cycles))
+    read_again = row.details.get("file", {}).get("content_sha256")
+    return row.content_sha256 if sha256 == read_again else sha256
+
+
+def _refuse_changed(database: Database, row: RunRow) -> None:
+    """Raise DamagedData where what is stored of a run is not what was sent."""
+    with database.reading() as connection:
+        columns = channels.stored_of_run(connection, row.run_key)
+    try:
+        sha256 = content_now(row, decoded(row, columns))
+    except KeyError as error:
+        raise DamagedData(f"run {row.run_id} is damaged: its details lack {error}") from error
+    if sha256 != row.content_sha256:
+        raise DamagedData(f"run {row.run_id} differs from what was sent: restore a backup")
+
+
 def incoming(row: RunRow, columns: Mapping[str, NDArray[np.float64]]) -> IncomingRun:
     return IncomingRun(
         kind=row.kind,
@@ -161,11 +188,21 @@ class Recorded:
     reader: RunReader
 
 
-def recorded(database: Database, state: ClutchState, *, whole: bool = False) -> Recorded:
-    """The clutch's runs as they are stored; `whole` with all channels in memory, else each is read when it is needed."""
+def recorded(database: Database, state: ClutchState, *, whole: bool = False, damaged: bool = False) -> Recorded:
+    """The clutch's runs as they are stored; `whole` with all channels in memory, else each is read when it is needed.
+    `damaged`: what follows from what was sent may be damaged. Raises DamagedData where what was sent is."""
     with database.reading() as connection:
+        if damaged:
+            allow_damage(connection)
         rows, aside = runs.page(connection, state.clutch_id), records.set_aside(connection, state.clutch_id)
-    reader = _loaded_reader(database, state.record, rows) if whole else run_reader(database, state.clutch_id)
+    if damaged:
+        for row in rows:
+            _refuse_changed(database, row)
+    reader = (
+        _loaded_reader(database, state.record, rows)
+        if whole
+        else run_reader(database, state.clutch_id, damaged=damaged)
+    )
     reader = replace(reader, torque_filter=state.record.torque_filter)
     return Recorded(state=state, rows=tuple(rows), aside=aside, reader=reader)
 
@@ -205,3 +242,17 @@ def recomputed(recorded: Recorded) -> Results:
     )
     summary = summarised(final, computed.tracking or Tracking(), evidence)
     return replace(computed, details=details, receipts=receipts, levels=levels, summary=summary)
+
+
+def mend(database: Database, clutch_id: str, damage: DamagedData) -> None:
+    """Compute all results of a clutch again from its runs, in place of those of which some are damaged.
+
+    Raises DamagedData where what was sent is damaged too, InvalidError as `recomputed` does.
+    """
+    _log.warning("%s: all results of clutch %s are computed again from its runs", damage, clutch_id)
+    for _ in records.attempts(clutch_id):
+        with database.reading() as connection:
+            state = records.state(connection, clutch_id, damaged=True)
+        computed = recomputed(recorded(database, state, damaged=True))
+        if records.replace_results(database, state, computed, damaged=True):
+            return

@@ -5,8 +5,9 @@ Lists begin with the newest.
 from collections.abc import Collection
 from dataclasses import dataclass
 
-from sqlalchemy import Connection, delete, func, or_, select, update
+from sqlalchemy import Connection, delete, func, or_, select
 
+from storage.checksums import amend
 from storage.dialects import among, newest_first, upsert
 from storage.encoding import Json, Rows, to_text
 from storage.tables import NOT_CLEARED, alarm, alarm_event, run
@@ -48,7 +49,7 @@ class EventRow:
         return CLEARED if self.cleared_at is not None else RAISED if self.acknowledged_at is None else ACKNOWLEDGED
 
 
-_rules, _events = Rows(AlarmRow), Rows(EventRow, key="event_key")
+_rules, _events = Rows(AlarmRow, of=alarm), Rows(EventRow, key="event_key", of=alarm_event)
 _IN_STATE = {
     RAISED: NOT_CLEARED & alarm_event.c.acknowledged_at.is_(None),
     ACKNOWLEDGED: NOT_CLEARED & alarm_event.c.acknowledged_at.is_not(None),
@@ -144,7 +145,7 @@ def acknowledge(connection: Connection, event_id: str, *, at: str, by: str, note
 
 
 def _change_event(connection: Connection, event_id: str, **columns: str | None) -> None:
-    connection.execute(update(alarm_event).where(alarm_event.c.event_id == event_id).values(columns))
+    amend(connection, alarm_event, [alarm_event.c.event_id == event_id], **columns)
 
 
 def last_heard(connection: Connection, clutch_ids: Collection[str]) -> dict[str, str]:

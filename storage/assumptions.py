@@ -9,6 +9,7 @@ from typing import Any, TypeAlias
 
 from sqlalchemy import Connection, Select, delete, func, select
 
+from storage.checksums import allows_damage, refuse_damaged, sealed
 from storage.dialects import json_length
 from storage.encoding import Json, Rows, to_list, to_text
 from storage.tables import adopted_model, corrected_cof, fleet_prior, run
@@ -28,7 +29,7 @@ class AdoptedRow:
     adopted_at: str
 
 
-_adoptions = Rows(AdoptedRow)
+_adoptions = Rows(AdoptedRow, of=adopted_model)
 
 
 def _adopted(clutch_id: str) -> Select[Any]:
@@ -61,18 +62,24 @@ def corrected_cofs_of(connection: Connection, clutch_id: str) -> dict[int, dict[
         .where(run.c.clutch_id == clutch_id)
         .order_by(corrected_cof.c.run_key, corrected_cof.c.pressure)
     )
-    for run_key, pressure, mean, deviation, draws in connection.execute(query):
-        cofs.setdefault(run_key, {})[pressure] = (mean, deviation, tuple(to_list(draws or "[]")))
+    rows = connection.execute(query)
+    damage_allowed = allows_damage(rows, corrected_cof)
+    for row in rows.mappings():
+        if not damage_allowed:
+            refuse_damaged(corrected_cof, dict(row))
+        draws = tuple(to_list(row["mean_cof_draws"] or "[]"))
+        cofs.setdefault(row["run_key"], {})[row["pressure"]] = (row["mean_cof"], row["mean_cof_sd"], draws)
     return cofs
 
 
 def write_corrected_cofs(connection: Connection, run_key: int, cofs: Mapping[float, CorrectedCof]) -> None:
     """Store a run's corrected mean COFs by pressure in place of those it had."""
     connection.execute(delete(corrected_cof).where(corrected_cof.c.run_key == run_key))
-    names = [column.name for column in corrected_cof.columns]
+    names = ("run_key", "pressure", "mean_cof", "mean_cof_sd", "mean_cof_draws")
     rows = [(run_key, pressure, mean, sd, to_text(list(draws))) for pressure, (mean, sd, draws) in cofs.items()]
     if rows:
-        connection.execute(corrected_cof.insert(), [dict(zip(names, row, strict=True)) for row in rows])
+        values = [sealed(corrected_cof, dict(zip(names, row, strict=True))) for row in rows]
+        connection.execute(corrected_cof.insert(), values)
 
 
 def clear_corrected_cofs(connection: Connection, clutch_id: str) -> None:
@@ -103,7 +110,7 @@ class FleetPriorRow:
     code_version: str
 
 
-_priors = Rows(FleetPriorRow)
+_priors = Rows(FleetPriorRow, of=fleet_prior)
 _from_all = fleet_prior.c.left_out == NOBODY
 _fleet_newest = (
     select(fleet_prior.c.fleet, func.max(fleet_prior.c.version).label("version"))

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from sqlalchemy import Connection, func, select
 
+from storage.checksums import sealed
 from storage.dialects import newest_first
 from storage.encoding import Json, Rows, to_text
 from storage.tables import change
@@ -40,7 +41,7 @@ class ChangeRow:
         return {name: getattr(self, name) for name in SHOWN}
 
 
-_rows = Rows(ChangeRow)
+_rows = Rows(ChangeRow, of=change)
 
 
 def insert(
@@ -58,7 +59,8 @@ def insert(
 ) -> None:
     """Store a change. Raises IntegrityError where the clutch is unknown."""
     of = {"clutch_id": clutch_id, "run_id": run_id, "action": action, "at": at, "by": by, "revision": revision}
-    connection.execute(change.insert(), of | {"reason": reason, "before": to_text(before), "after": to_text(after)})
+    what = {"reason": reason, "before": to_text(before), "after": to_text(after)}
+    connection.execute(change.insert(), sealed(change, of | what))
 
 
 def page(

@@ -1,13 +1,15 @@
 """The table of clutches: the current record, the first record, and the summary that lists show."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import Connection, Select, case, func, select, tuple_, update
+from sqlalchemy import Connection, Select, case, func, select, tuple_
 
+from storage.checksums import amend
 from storage.dialects import among, json_fields
 from storage.encoding import Json, Rows, to_text
+from storage.engine.errors import DamagedData
 from storage.tables import HELD_ONLY, clutch, run
 
 
@@ -59,7 +61,7 @@ class Counts:
     held: int
 
 
-_stored = Rows(ClutchRow)
+_stored = Rows(ClutchRow, of=clutch)
 #: What stands for itself in a pattern.
 _ESCAPED = str.maketrans({sign: f"/{sign}" for sign in "%_/"})
 _kind = json_fields(clutch.c.record, "friction_material", "reaction_plate", "fluid")
@@ -96,9 +98,28 @@ def page(
         query = query.where(clutch.c.clutch_id > after[1] if by_name else tuple_(*_worst_first) > tuple_(*after))
     # their ids by an index alone, however many are passed over; then the rows
     ids = list(connection.execute(query).scalars())
-    found = _stored.all(connection.execute(select(clutch).where(clutch.c.clutch_id.in_(ids))))
-    rows = {row.clutch_id: row for row in found}
+    found = connection.execute(select(clutch).where(clutch.c.clutch_id.in_(ids)))
+    of = _stored.reader(found)
+    rows = {row.clutch_id: _whole_or_damaged(of, row) for row in found}
     return [rows[clutch_id] for clutch_id in ids]
+
+
+def _whole_or_damaged(of: Callable[[Any], ClutchRow], row: Any) -> ClutchRow:
+    """The clutch; where it is damaged, one of that name without record and results, whose summary says so: a list of others
+    must not fail for it."""
+    try:
+        return of(row)
+    except DamagedData as error:
+        return ClutchRow(
+            clutch_id=row.clutch_id,
+            record={"clutch_id": row.clutch_id},
+            content_sha256="",
+            created_at="",
+            revision=row.revision,
+            rank=row.rank,
+            summary={"damaged": str(error)},
+            archived=bool(row.archived),
+        )
 
 
 def counts(connection: Connection, choice: Choice) -> Counts:
@@ -152,7 +173,7 @@ def set_summary(
 ) -> None:
     """Replace what lists show of a clutch: `state` is its state's name, or `if_disputed` where `life` is in dispute. Raises
     LookupError on an unknown one."""
-    state_name = case((clutch.c.disputed == life, if_disputed), else_=state)
+    state_name = lambda row: if_disputed if row["disputed"] == life else state  # noqa: E731
     _change(connection, clutch_id, {"rank": rank, "summary": to_text(summary), "state": state_name})
 
 
@@ -169,13 +190,13 @@ def set_silent(connection: Connection, clutch_id: str, silent: str | None, *, st
 
 
 def _change(connection: Connection, clutch_id: str, columns: Mapping[str, object]) -> None:
-    if connection.execute(update(clutch).where(clutch.c.clutch_id == clutch_id).values(columns)).rowcount != 1:
+    if amend(connection, clutch, [clutch.c.clutch_id == clutch_id], **columns) != 1:
         raise LookupError(f"clutch {clutch_id!r} is not stored")
 
 
 def bump_revision(connection: Connection, clutch_id: str) -> int:
     """Raise the clutch's revision by one and return it. Raises LookupError on an unknown one."""
-    _change(connection, clutch_id, {"revision": clutch.c.revision + 1})
+    _change(connection, clutch_id, {"revision": lambda row: row["revision"] + 1})
     return int(connection.execute(select(clutch.c.revision).where(clutch.c.clutch_id == clutch_id)).scalar_one())
 
 

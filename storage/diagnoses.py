@@ -5,8 +5,9 @@ finished diagnosis.
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from sqlalchemy import Connection, func, select, update
+from sqlalchemy import Connection, func, select
 
+from storage.checksums import amend
 from storage.dialects import json_fields, newest_first
 from storage.encoding import Json, Rows, to_object
 from storage.runs import ACCEPTED
@@ -39,7 +40,7 @@ class DiagnosisRow:
     problem: str | None = None
 
 
-_rows = Rows(DiagnosisRow, key="diagnosis_key")
+_rows = Rows(DiagnosisRow, key="diagnosis_key", of=diagnosis)
 
 
 def insert(connection: Connection, row: DiagnosisRow) -> None:
@@ -82,8 +83,8 @@ def fail(connection: Connection, diagnosis_id: str, at: str, problem: str) -> bo
 
 
 def _end(connection: Connection, diagnosis_id: str, **fields: object) -> bool:
-    this = update(diagnosis).where(diagnosis.c.diagnosis_id == diagnosis_id, diagnosis.c.status == RUNNING)
-    return connection.execute(this.values(_rows.columns(**fields))).rowcount == 1
+    this = (diagnosis.c.diagnosis_id == diagnosis_id, diagnosis.c.status == RUNNING)
+    return amend(connection, diagnosis, this, **_rows.columns(**fields)) == 1
 
 
 def last_run_key(connection: Connection, clutch_id: str) -> int:

@@ -40,8 +40,9 @@ from typing import Any, Generic, TypeAlias, TypeVar, get_args, get_origin, get_t
 
 import numpy as np
 from numpy.typing import NDArray
-from sqlalchemy import Result, Row
+from sqlalchemy import Result, Row, Table
 
+from storage import checksums
 from storage.engine.errors import DamagedData
 
 CODEC = "shuffle-zlib"
@@ -291,10 +292,13 @@ _CODINGS: dict[Any, _Coding] = {
 
 
 class Rows(Generic[Value]):
-    """The rows that hold the fields of a dataclass, and perhaps other columns beside them; the database gives the `key`."""
+    """The rows that hold the fields of a dataclass, and perhaps other columns beside them; the database gives the `key`.
 
-    def __init__(self, kind: type[Value], *, key: str = "") -> None:
-        self._kind, self._key = kind, key
+    Whole rows `of` a table have their checksum.
+    """
+
+    def __init__(self, kind: type[Value], *, key: str = "", of: Table | None = None) -> None:
+        self._kind, self._key, self._of = kind, key, of
         hints = get_type_hints(kind)
         self.names = tuple(hints)
         codings = {name: _coding(hint) for name, hint in hints.items()}
@@ -302,7 +306,8 @@ class Rows(Generic[Value]):
 
     def values(self, value: Value, **others: object) -> dict[str, Any]:
         """The columns of a row but its key, by name; `others` take the place of the value's own, or come beside them."""
-        return self.columns(**{name: getattr(value, name) for name in self.names if name != self._key}) | others
+        values = self.columns(**{name: getattr(value, name) for name in self.names if name != self._key}) | others
+        return values if self._of is None else checksums.sealed(self._of, values)
 
     def columns(self, **fields: object) -> dict[str, Any]:
         """Some fields as their columns have them."""
@@ -311,14 +316,24 @@ class Rows(Generic[Value]):
         return fields
 
     def reader(self, rows: Result[*tuple[Any, ...]]) -> Callable[[Row[*tuple[Any, ...]]], Value]:
-        """What makes a value of each of these rows: where its fields stand is found once for all."""
+        """What makes a value of each of these rows: where its fields stand is found once for all. Raises DamagedData, unless
+        damage is allowed: then what cannot be decoded is empty."""
         columns = list(rows.keys())
         fields_of = itemgetter(*map(columns.index, self.names))
+        table = self._of
+        damage_allowed = table is not None and checksums.allows_damage(rows, table)
 
         def of(row: Row[*tuple[Any, ...]]) -> Value:
+            if table is not None and not damage_allowed:
+                checksums.refuse_damaged(table, dict(zip(columns, row, strict=True)))
             fields = dict(zip(self.names, fields_of(row), strict=True))
             for name, (_, decode) in self._coded.items():
-                fields[name] = None if fields[name] is None else decode(fields[name])
+                try:
+                    fields[name] = None if fields[name] is None else decode(fields[name])
+                except ValueError as error:
+                    if not damage_allowed:
+                        raise DamagedData(f"{name} of a {self._kind.__name__} cannot be read: {error}") from error
+                    fields[name] = {}
             return self._kind(**fields)
 
         return of

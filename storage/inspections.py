@@ -8,8 +8,9 @@ import sqlite3
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from sqlalchemy import Connection, LargeBinary, func, literal_column, select, tuple_, update
+from sqlalchemy import Connection, LargeBinary, func, literal_column, select, tuple_
 
+from storage.checksums import amend
 from storage.dialects import among
 from storage.encoding import Json, Rows
 from storage.runs import ACCEPTED
@@ -43,7 +44,7 @@ class PhotographRow:
     received_by: str
 
 
-_rows, _shown = Rows(InspectionRow, key="inspection_key"), Rows(PhotographRow)
+_rows, _shown = Rows(InspectionRow, key="inspection_key", of=inspection), Rows(PhotographRow)
 _photographs = (
     select(inspection_photograph.c.inspection_key, *(photograph.c[name] for name in _shown.names[:3]))
     .add_columns(inspection_photograph.c.received_at, inspection_photograph.c.received_by)
@@ -78,8 +79,7 @@ def page(
 
 def set_state(connection: Connection, inspection_key: int, state: str) -> None:
     """Withdraw an inspection or take that back. Raises LookupError on an unknown one."""
-    this = update(inspection).where(inspection.c.inspection_key == inspection_key)
-    if connection.execute(this.values(state=state)).rowcount != 1:
+    if amend(connection, inspection, [inspection.c.inspection_key == inspection_key], state=state) != 1:
         raise LookupError(f"inspection {inspection_key} is not stored")
 
 

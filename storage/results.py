@@ -51,7 +51,7 @@ class FitRow:
 
 
 _MATRICES = ("covariance", "unbiased_covariance")
-_fits = Rows(FitRow)
+_fits = Rows(FitRow, of=fit)
 
 
 def write_fits(connection: Connection, run_key: int, rows: Sequence[FitRow]) -> None:
@@ -108,7 +108,7 @@ class PredictionRow:
     code_version: str
 
 
-_predictions = Rows(PredictionRow)
+_predictions = Rows(PredictionRow, of=prediction)
 
 
 def put_predictions(connection: Connection, clutch_id: str, rows: Sequence[PredictionRow]) -> None:
@@ -154,7 +154,7 @@ class FilterStateRow:
     code_version: str
 
 
-_states = Rows(FilterStateRow)
+_states = Rows(FilterStateRow, of=filter_state)
 
 
 def put_filter_states(connection: Connection, clutch_id: str, rows: Sequence[FilterStateRow]) -> None:

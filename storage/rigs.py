@@ -24,7 +24,7 @@ class RigRow:
     saved_by: str
 
 
-_rows = Rows(RigRow)
+_rows = Rows(RigRow, of=rig)
 
 
 def insert(connection: Connection, row: RigRow) -> None:

@@ -7,8 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
-from sqlalchemy import ColumnElement, Connection, Select, TextClause, and_, exists, func, select, tuple_, update
+from sqlalchemy import ColumnElement, Connection, Select, TextClause, and_, exists, func, select, tuple_
 
+from storage.checksums import amend
 from storage.dialects import Pair, json_text, json_value
 from storage.encoding import Json, Rows
 from storage.tables import HELD_ONLY, fit, run
@@ -77,7 +78,7 @@ class RunInOrder:
     duty_duration_s: float | None = None
 
 
-_stored, _listed = Rows(RunRow, key="run_key"), Rows(ReceiptRow)
+_stored, _listed = Rows(RunRow, key="run_key", of=run), Rows(ReceiptRow)
 _ORDER = (run.c.cycles, run.c.run_id)
 _LIGHT = tuple(field.name for field in fields(RunInOrder))
 _light = select(
@@ -224,6 +225,5 @@ def set_state(
 
 
 def _change(connection: Connection, run_key: int, **fields: object) -> None:
-    this = update(run).where(run.c.run_key == run_key)
-    if connection.execute(this.values(_stored.columns(**fields))).rowcount != 1:
+    if amend(connection, run, [run.c.run_key == run_key], **_stored.columns(**fields)) != 1:
         raise LookupError(f"run {run_key} is not stored")

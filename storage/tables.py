@@ -24,6 +24,15 @@ def _optional(kind: type[TypeEngine[Any]] | TypeEngine[Any], *names: str) -> lis
     return [Column(name, kind) for name in names]
 
 
+#: The name of the column of checksums.
+CHECKSUM = "checksum"
+
+
+def _checksum() -> Column[Any]:
+    """Of all other columns of a row (`storage.checksums`)."""
+    return Column(CHECKSUM, WHOLE, nullable=False, server_default=text("0"))
+
+
 #: The value stands in the text: with a parameter in its place SQLite would not use the index of held runs alone.
 HELD_ONLY = text("state = 'held'")
 OPEN_ONLY = text("state IN ('waiting', 'running')")
@@ -47,6 +56,7 @@ clutch = Table(
     Column("disputed", TEXT),
     Column("searched", TEXT, nullable=False, server_default=text("''")),
     Column("silent", TEXT),
+    _checksum(),
     Index("clutch_worst_first", "archived", "rank", "clutch_id"),
     Index("clutch_by_state", "archived", "state", "rank", "clutch_id"),
 )
@@ -67,6 +77,7 @@ run = Table(
     Column("sent_cycles", NUMBER),
     Column("doubts", TEXT, nullable=False, server_default="[]"),
     Column("received_by", TEXT),
+    _checksum(),
     UniqueConstraint("clutch_id", "run_id", name="run_once_per_clutch"),
     Index("run_in_order", "clutch_id", "cycles", "run_id"),
     Index("run_held", "clutch_id", sqlite_where=HELD_ONLY, postgresql_where=HELD_ONLY),
@@ -128,6 +139,7 @@ fit = Table(
     *_optional(NUMBER, "mean_cof", "mean_cof_sd"),
     *_required(TEXT, "message", "code_version"),
     Column("unbiased_covariance", TEXT),
+    _checksum(),
 )
 
 prediction = Table(
@@ -138,6 +150,7 @@ prediction = Table(
     Column("pressure", NUMBER, primary_key=True),
     Column("cycles", NUMBER, primary_key=True),
     *_required(TEXT, "payload", "code_version"),
+    _checksum(),
 )
 
 filter_state = Table(
@@ -149,6 +162,7 @@ filter_state = Table(
     Column("runs", WHOLE, nullable=False),
     Column("arrays", LargeBinary, nullable=False),
     Column("code_version", TEXT, nullable=False),
+    _checksum(),
 )
 
 #: A diagnosis of the runs up to `last_run_key` that belong to the life that `life` names ("" or a rebuild's run_id).
@@ -166,6 +180,7 @@ diagnosis = Table(
     Column("as_of_cycles", NUMBER),
     *_optional(TEXT, "report", "extension", "problem"),
     Column("code_version", TEXT, nullable=False),
+    _checksum(),
     UniqueConstraint("diagnosis_id", name="diagnosis_once"),
     Index("diagnosis_in_order", "clutch_id", "diagnosis_key"),
 )
@@ -197,6 +212,7 @@ adopted_model = Table(
     Column("version", WHOLE, primary_key=True),
     Column("diagnosis_id", TEXT, ForeignKey("diagnosis.diagnosis_id")),
     Column("adopted_at", TEXT, nullable=False),
+    _checksum(),
 )
 
 #: Mean COF under the adopted model, beside that of the fits, where the model corrects the measurement for an artefact.
@@ -207,6 +223,7 @@ corrected_cof = Table(
     Column("pressure", NUMBER, primary_key=True),
     *_required(NUMBER, "mean_cof", "mean_cof_sd"),
     Column("mean_cof_draws", TEXT),
+    _checksum(),
 )
 
 #: Priors learned from fleets of earlier lives, by version from 1 on. `fleet` names the kind of clutch (JSON), `left_out`
@@ -219,6 +236,7 @@ fleet_prior = Table(
     Column("version", WHOLE, primary_key=True),
     Column("left_out", TEXT, primary_key=True),
     *_required(TEXT, "created_at", "members", "content", "code_version"),
+    _checksum(),
 )
 
 #: What was found where the clutch was taken apart. `content` is what was posted (JSON, in the units of its fields' names),
@@ -231,6 +249,7 @@ inspection = Table(
     Column("inspection_id", TEXT, nullable=False),
     Column("cycles", NUMBER, nullable=False),
     *_required(TEXT, "content", "content_sha256", "received_at", "received_by", "state"),
+    _checksum(),
     UniqueConstraint("clutch_id", "inspection_id", name="inspection_once_per_clutch"),
     Index("inspection_in_order", "clutch_id", "cycles", "inspection_id"),
 )
@@ -262,6 +281,7 @@ rig = Table(
     Column("name", TEXT, primary_key=True),
     Column("version", WHOLE, nullable=False),
     *_required(TEXT, "content", "saved_at", "saved_by"),
+    _checksum(),
 )
 
 #: Rules of alarms. `content` is the rule (JSON) in force; `clutch_id` null: of all clutches, or of those that `content`
@@ -273,6 +293,7 @@ alarm = Table(
     Column("clutch_id", TEXT, ForeignKey("clutch.clutch_id")),
     Column("enabled", WHOLE, nullable=False),
     *_required(TEXT, "content", "saved_at", "saved_by"),
+    _checksum(),
 )
 
 #: The value stands in the text, as that of HELD_ONLY.
@@ -290,6 +311,7 @@ alarm_event = Table(
     *_optional(TEXT, "acknowledged_at", "acknowledged_by"),
     Column("note", TEXT, nullable=False, server_default=text("''")),
     Column("cleared_at", TEXT),
+    _checksum(),
     UniqueConstraint("event_id", name="alarm_event_once"),
     Index(
         "alarm_event_open", "clutch_id", "alarm_id", unique=True, sqlite_where=NOT_CLEARED, postgresql_where=NOT_CLEARED
@@ -302,6 +324,7 @@ webhook = Table(
     metadata,
     Column("webhook_id", TEXT, primary_key=True),
     *_required(TEXT, "address", "secret", "content", "created_at", "created_by"),
+    _checksum(),
 )
 
 #: The value stands in the text, as that of HELD_ONLY.
@@ -337,6 +360,7 @@ change = Table(
     Column("run_id", TEXT),
     *_required(TEXT, "at", "by", "action", "reason", "before", "after"),
     Column("revision", WHOLE, nullable=False),
+    _checksum(),
     Index("change_in_order", "clutch_id", "change_key"),
 )
 

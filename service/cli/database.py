@@ -107,7 +107,8 @@ def verify(
         int | None, typer.Option(min=0, help="Recompute only this many clutches, chosen at random; default: all")
     ] = None,
 ) -> None:
-    """Check the database: its pages and schema, the hash of every run, inspection and photograph, and all results.
+    """Check the database: its pages and schema, every row's checksum, the hash of every run, inspection and photograph, and
+    all results.
 
     Prints one line for each fault, and ends with 1 if there is any. Works beside a running service and on a backup.
     """
@@ -132,18 +133,15 @@ def verify(
                 fail(f"{damaged} findings: the file is damaged. Restore a backup: clutchlife restore BACKUP")
             findings += tell(other_schema(connection))
             ids = clutches.all_ids(connection)
+        findings += tell(verification.check_other_rows(opened).findings)
         chosen = set(ids if sample is None else random.sample(ids, min(sample, len(ids))))
         task = progress.add_task("verifying", total=len(ids))
         for clutch_id in ids:
-            content = verification.check_runs(opened, clutch_id)
-            runs += content.runs
-            surfaces = verification.check_inspections(opened, clutch_id)
-            inspections, photographs = inspections + surfaces.inspections, photographs + surfaces.photographs
-            findings += tell(content.findings) + tell(surfaces.findings)
-            if clutch_id in chosen and not content.findings:
-                results = verification.check_results(opened, clutch_id)
-                findings += tell(results.findings)
-                earlier.update(results.earlier)
+            checked = verification.check(opened, clutch_id, recompute=clutch_id in chosen)
+            findings += tell(checked.findings)
+            runs, inspections = runs + checked.runs, inspections + checked.inspections
+            photographs += checked.photographs
+            earlier.update(checked.earlier)
             progress.advance(task)
     for version, count in sorted(earlier.items()):
         print_line(
@@ -151,8 +149,8 @@ def verify(
         )
     if inspections:
         print_line(f"{inspections} inspections with {photographs} photographs were checked")
-    checked = f"{runs} runs of {len(ids)} clutches were checked"
-    summary = f"{checked}, {len(chosen)} of the clutches computed again: {findings} findings"
+    checked_runs = f"{runs} runs of {len(ids)} clutches were checked"
+    summary = f"{checked_runs}, {len(chosen)} of the clutches computed again: {findings} findings"
     if findings:
         fail(summary)
     print_line(summary)
@@ -187,8 +185,7 @@ def migrate(
             with progress(err, "checking clutches") as advance:
                 advance(0, total=len(ids))
                 for clutch_id in ids:
-                    findings += verification.check_runs(moving.target, clutch_id).findings
-                    findings += verification.check_inspections(moving.target, clutch_id).findings
+                    findings += verification.check(moving.target, clutch_id, recompute=False).findings
                     advance()
             for finding in findings:
                 print_line(finding)

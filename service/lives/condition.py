@@ -157,6 +157,8 @@ def state_of(summary: Mapping[str, Any], *, disputed: bool, silent: str | None =
 def _state_and_reason(summary: Mapping[str, Any], *, disputed: bool, silent: str | None) -> tuple[str, str]:
     """The first state that holds, and why as a clause; no reason where the statement of the remaining life is one."""
     held = summary.get("held", 0)
+    if "damaged" in summary:
+        return CHECK, f"its stored results are damaged: {summary['damaged']}"
     if "status" not in summary:
         return CHECK, held_in_words(held) if held else "no run counts yet"
     status = summary["status"]
@@ -224,6 +226,8 @@ def _action(name: str, summary: Mapping[str, Any], soon: str, diagnosis: Mapping
         return "Run a stationary test, or replace the clutch." if unseen else "Replace the clutch."
     if name == MAINTENANCE:
         return f"Replace {soon}."
+    if "damaged" in summary:
+        return "Run clutchlife verify, then clutchlife replay, on the service's machine."
     if name == CHECK and held:
         return "Confirm, correct or withdraw " + ("one held run." if held == 1 else f"{held} held runs.")
     if name == CHECK and summary.get("status", INSUFFICIENT) != INSUFFICIENT:

@@ -1,36 +1,38 @@
 """What is stored, held against itself: nothing is changed. Findings are sentences, none where all is as it should be.
 
-Runs, inspections and photographs are held against the hashes that their senders were given; fits, receipts and predictions
-against what is computed again from the runs.
+Rows are held against their checksums; runs, inspections and photographs against the hashes that their senders were given;
+fits, receipts and predictions against what is computed again from the runs.
 """
 
 import hashlib
 import json
 import math
 from collections import Counter
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, replace
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
+import sqlalchemy as sa
 from sqlalchemy import Connection
 
 from service import records, stored_runs
 from service.columns import bar
 from service.errors import InvalidError
 from service.lives.assumptions import ALL_PRESSURES
-from service.lives.incoming_run import content_hash
 from service.lives.recomputation import Results
 from service.lives.tracks import CARRIED
 from service.records import inspection_hash
 from service.settings import CODE_VERSION
-from service.stored_runs import decoded
-from storage import channels, inspections, results, runs
+from service.stored_runs import content_now, decoded
+from storage import channels, checksums, inspections, results, runs
 from storage.channels import Stored
+from storage.checksums import allow_damage
 from storage.encoding import to_text
 from storage.engine.database import Database
-from storage.engine.errors import DamagedData
+from storage.engine.errors import DamagedData, StorageError
 from storage.inspections import InspectionRow, PhotographRow
 from storage.runs import RunRow
+from storage.tables import CHECKSUM, metadata, run
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,9 +47,84 @@ class Checked:
     earlier: Mapping[str, int] = field(default_factory=dict)
 
 
+def check(database: Database, clutch_id: str, *, recompute: bool) -> Checked:
+    """All of a clutch; its results computed again where asked for, and where all that they follow from is whole.
+
+    Whatever a damaged value leads to is a finding: the next clutch is to be checked too.
+    """
+    content = _Sum()
+    for part in (check_rows, check_runs, check_inspections):
+        content.add(_finished(part, database, clutch_id))
+    if recompute and not content.findings:
+        content.add(_finished(check_results, database, clutch_id))
+    return Checked(**vars(content))
+
+
+class _Sum:
+    """What several checks have found."""
+
+    def __init__(self) -> None:
+        self.findings: tuple[str, ...] = ()
+        self.runs = self.inspections = self.photographs = 0
+        self.earlier: Counter[str] = Counter()
+
+    def add(self, checked: Checked) -> None:
+        self.findings += checked.findings
+        self.runs += checked.runs
+        self.inspections += checked.inspections
+        self.photographs += checked.photographs
+        self.earlier.update(checked.earlier)
+
+
+def _finished(part: Callable[[Database, str], Checked], database: Database, clutch_id: str) -> Checked:
+    try:
+        return part(database, clutch_id)
+    except Exception as error:  # noqa: BLE001  (a damaged value may lead to any)
+        return Checked(findings=(f"{clutch_id}: cannot be checked: {type(error).__name__}: {error}",))
+
+
+def check_rows(database: Database, clutch_id: str) -> Checked:
+    """Every row of a clutch against its checksum."""
+    with database.reading() as connection:
+        found = _unreadable(connection, {table: _of_clutch(table, clutch_id) for table in _tables(of_clutches=True)})
+    return Checked(findings=tuple(f"{clutch_id}: {finding}" for finding in found))
+
+
+def check_other_rows(database: Database) -> Checked:
+    """Every row that is of no clutch against its checksum: priors of fleets, rig profiles, rules and receivers of alarms."""
+    with database.reading() as connection:
+        found = _unreadable(connection, {table: sa.true() for table in _tables(of_clutches=False)})
+    return Checked(findings=tuple(found))
+
+
+def _unreadable(connection: Connection, chosen: Mapping[sa.Table, sa.ColumnElement[bool]]) -> list[str]:
+    found = []
+    for table, rows in chosen.items():
+        try:
+            found += checksums.findings(connection, table, rows)
+        except (StorageError, sa.exc.DBAPIError) as error:
+            found.append(f"a row of {table.name} cannot be read: {error}")
+    return found
+
+
+def _tables(*, of_clutches: bool) -> list[sa.Table]:
+    """The tables that have checksums; a rule of alarms may be of no clutch."""
+    sealed = [table for table in metadata.sorted_tables if CHECKSUM in table.c]
+    return [
+        t for t in sealed if (t.name != "alarm" and bool({"clutch_id", "run_key"} & set(t.c.keys()))) is of_clutches
+    ]
+
+
+def _of_clutch(table: sa.Table, clutch_id: str) -> sa.ColumnElement[bool]:
+    if "clutch_id" in table.c:
+        return table.c.clutch_id == clutch_id
+    return table.c.run_key.in_(sa.select(run.c.run_key).where(run.c.clutch_id == clutch_id))
+
+
 def check_runs(database: Database, clutch_id: str) -> Checked:
     """Every run of a clutch against the hash that its sender was given; one run in memory at a time."""
     with database.reading() as connection:
+        allow_damage(connection, everywhere=True)  # `check_rows` finds it
         rows = runs.page(connection, clutch_id)
     findings = [finding for row in rows if (finding := _finding(database, row)) is not None]
     return Checked(runs=len(rows), findings=tuple(f"{clutch_id}: {finding}" for finding in findings))
@@ -61,13 +138,11 @@ def _finding(database: Database, row: RunRow) -> str | None:
         sent = decoded(row, columns)
     except DamagedData as error:
         return str(error)
-    sha256 = content_hash(replace(sent, cycles=row.cycles if row.sent_cycles is None else row.sent_cycles))
-    file = row.details.get("file")
+    sha256, file = content_now(row, sent), row.details.get("file")
     if file is not None:
         finding = _file_finding(stored_file, row.run_id, file["sha256"])
         if finding is not None:
             return finding
-        sha256 = row.content_sha256 if sha256 == file.get("content_sha256") else sha256
     if not sha256 == row.content_sha256 == row.receipt["content_sha256"]:
         return (
             f"run {row.run_id} differs from what was sent. sha256 of its content: now {sha256}, "
@@ -183,6 +258,7 @@ def _are_numbers(*values: Any) -> bool:
 def check_inspections(database: Database, clutch_id: str) -> Checked:
     """Every inspection of a clutch and every photograph of it against its hash; one photograph in memory at a time."""
     with database.reading() as connection:
+        allow_damage(connection, everywhere=True)
         rows = inspections.page(connection, clutch_id)
         of_keys = inspections.photographs(connection, [row.inspection_key for row in rows])
     photographs = [(row, photograph) for row in rows for photograph in of_keys[row.inspection_key]]

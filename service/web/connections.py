@@ -9,7 +9,8 @@ answer in time is cut off.
 import asyncio
 import http
 import resource
-import socket
+import struct
+from socket import SO_LINGER, SO_SNDBUF, SOL_SOCKET
 from typing import Any, NoReturn
 
 from uvicorn.config import Config
@@ -57,8 +58,8 @@ def bounded(
         def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
             super().connection_made(transport)
             transport.set_write_buffer_limits(high=0)  # paused is: the reader has not taken all that was written
-            line: socket.socket = transport.get_extra_info("socket")
-            line.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, PIECE_BYTES)  # else the system takes megabytes for it
+            line = transport.get_extra_info("socket")
+            line.setsockopt(SOL_SOCKET, SO_SNDBUF, PIECE_BYTES)  # else the system takes megabytes for it
             others: set[Any] = self.connections  # of this protocol all of them
             addresses = [other.client[0] for other in others if other.client is not None]
             if self.client is not None and addresses.count(self.client[0]) > most:
@@ -84,7 +85,7 @@ def bounded(
                 self._end_deadline()
 
         def pause_writing(self) -> None:
-            self._taking = self.loop.call_later(taken_seconds, self.transport.abort)
+            self._taking = self.loop.call_later(taken_seconds, self._cut_off)
             super().pause_writing()
 
         def resume_writing(self) -> None:
@@ -170,6 +171,12 @@ def bounded(
                 self._refuse(http.HTTPStatus.REQUEST_TIMEOUT, text)
             else:
                 self.transport.close()
+
+        def _cut_off(self) -> None:
+            """End the connection at once: closed in order, the system would keep what was not taken for minutes."""
+            linger = struct.pack("ii", 1, 0)
+            self.transport.get_extra_info("socket").setsockopt(SOL_SOCKET, SO_LINGER, linger)
+            self.transport.abort()
 
         def _end_taking(self) -> None:
             if self._taking is not None:

@@ -12,6 +12,7 @@ from starlette.exceptions import HTTPException
 
 from service.errors import (
     ConflictError,
+    DamagedError,
     FieldError,
     ForbiddenError,
     InvalidError,
@@ -30,7 +31,7 @@ from service.queries.cache import to_json
 from service.schemas.base import Problem, rule_in_words
 from service.web.auth import route_of
 from service.web.limits import RETRY_AFTER_SECONDS
-from storage.engine.errors import DatabaseBusy, RawStoreUnavailable, StorageError, UnstorableText
+from storage.engine.errors import DamagedData, DatabaseBusy, RawStoreUnavailable, StorageError, UnstorableText
 
 PROBLEM_TYPE = "application/problem+json"
 
@@ -99,6 +100,11 @@ def _storage_error(_: Request, error: StorageError) -> Response:
     _log.error("storage: %s", error)
     if isinstance(error, RawStoreUnavailable):
         return problem(503, "raw-records", "The store of raw records cannot be used", f"{error}. Nothing was changed")
+    if isinstance(error, DamagedData):
+        detail = (
+            f"{error}. On the service's machine, `clutchlife verify` lists damage and `clutchlife replay` mends results"
+        )
+        return refused(DamagedError, detail)
     slug, title = ("busy", "Busy") if isinstance(error, DatabaseBusy) else ("storage", "The database cannot be used")
     return problem(503, slug, title, "nothing was changed: send the request again, or see the service's log")
 

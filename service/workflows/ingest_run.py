@@ -42,6 +42,7 @@ from service.settings import CODE_VERSION
 from storage import changes, channels, results, runs
 from storage.channels import PackedFile
 from storage.engine.database import Database
+from storage.engine.errors import DamagedData
 from storage.runs import RunRow
 
 #: Bytes of a packed file that are kept. Derived: a value of SQLite's has 1e9 at most.
@@ -96,12 +97,23 @@ def ingest(
     by: str = "local",
     file: PackedFile | None = None,
 ) -> tuple[dict[str, Any], bool]:
-    """Take in a run that `by` sent, read from `file`; returns its receipt and whether it is new.
+    """Take in a run that `by` sent, read from `file`; returns its receipt and whether it is new. Where results of earlier
+    runs are damaged they are computed again first.
 
     The same run again gives the receipt as it is then, marked a duplicate. Raises NotFoundError for an unknown clutch,
     ArchivedError for one that takes in no more, ConflictError where other content is known under the run's name, and
     BusyError where the clutch's geometry or filter was edited meanwhile; then nothing has changed.
     """
+    try:
+        return _ingested(database, clutch_id, run, received_at=received_at, by=by, file=file)
+    except DamagedData as damage:
+        stored_runs.mend(database, clutch_id, damage)
+        return _ingested(database, clutch_id, run, received_at=received_at, by=by, file=file)
+
+
+def _ingested(
+    database: Database, clutch_id: str, run: IncomingRun, *, received_at: str, by: str, file: PackedFile | None
+) -> tuple[dict[str, Any], bool]:
     with database.reading() as connection:
         clutch = records.clutch(connection, clutch_id)
         stored = _stored(connection, clutch_id, run)

@@ -1,5 +1,6 @@
 """Results are recomputed from the raw runs, which are never changed: loaded, computed by a pure function, stored."""
 
+import logging
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
@@ -15,6 +16,8 @@ from storage.encoding import Json
 from storage.engine.database import Database
 from storage.engine.errors import DamagedData
 
+_log = logging.getLogger("clutchlife")
+
 
 def clutch_ids(database: Database) -> list[str]:
     with database.reading() as connection:
@@ -29,12 +32,22 @@ def replay(database: Database, clutch_ids: Sequence[str], executor: Executor) ->
     """
 
     def load(clutch_id: str) -> Recorded:
+        try:
+            return loaded(clutch_id, damaged=False)
+        except DamagedData as error:
+            _log.warning("%s: it is computed again from the runs", error)
+            return loaded(clutch_id, damaged=True)
+
+    def loaded(clutch_id: str, *, damaged: bool) -> Recorded:
         with database.reading() as connection:
-            state = records.state(connection, clutch_id)
-        return stored_runs.recorded(database, state, whole=executor.elsewhere)
+            state = records.state(connection, clutch_id, damaged=damaged)
+        return stored_runs.recorded(database, state, whole=executor.elsewhere, damaged=damaged)
 
     def store(recorded: Recorded, computed: Results) -> bool:
-        return records.replace_results(database, recorded.state, computed)
+        try:
+            return records.replace_results(database, recorded.state, computed)
+        except DamagedData:  # it is replaced
+            return records.replace_results(database, recorded.state, computed, damaged=True)
 
     compute = stored_runs.recomputed
     for ended in in_rounds(executor, clutch_ids, load=load, compute=compute, store=store, rounds=MAX_ATTEMPTS):

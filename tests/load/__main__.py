@@ -27,7 +27,7 @@ from service.client.clutchlife import ClutchlifeError
 from tests.benchmarks.diagnosis import post_life
 from tests.benchmarks.memory import busy_seconds, family_seconds
 from tests.load import checks
-from tests.load.bodies import Post, life
+from tests.load.bodies import Post, life, long_file
 from tests.load.field import DIAGNOSED, Counts, Field, Options
 from tests.load.report import demands, markdown, paces
 from tests.storage.engine.postgresql.server import postgresql_server
@@ -51,6 +51,11 @@ def run(options: Options, folder: Path) -> Counts:
         pids = [server.pid for server in servers]
         with httpx2.Client(base_url=servers[-1].url, timeout=120) as http:
             post_life(http, DIAGNOSED, options.states, WHOLE)
+            if options.slow:
+                http.post("/v1/clutches", json={"clutch_id": "slowly-read"}).raise_for_status()
+                arguments = "kind=stationary_stribeck&cycles=0&filename=a.csv&run_id=file"
+                answer = http.post(f"/v1/clutches/slowly-read/runs/file?{arguments}", content=long_file())
+                answer.raise_for_status()
         gc.collect()
         gc.freeze()  # the prepared bodies are not looked through by the collector: it would delay what is sent meanwhile
         before = _worked(pids)
@@ -108,6 +113,7 @@ def report(options: Options) -> Counts:
     with tempfile.TemporaryDirectory(prefix="clutchlife-load-") as folder:
         loaded = run(options, Path(folder))
     shown = "raw files among the posts" if options.raw else "no raw files"
+    shown += f", {options.slow} slow readers" if options.slow else ""
     services = f", {options.services} services on PostgreSQL" if options.database else ""
     print(f"### {options.rigs} rigs and {options.clients} clients for {options.seconds:g} s, {shown}{services}\n")
     versions = f"Python {platform.python_version()}, SQLite {sqlite3.sqlite_version}"
@@ -136,6 +142,7 @@ def main() -> int:
         ("clients", "that ask once a second"),
         ("seed", "of the lives, and of the moments in a second at which clients ask"),
         ("interval", "seconds from one run of a rig to its next, at least"),
+        ("slow", "readers that ask for a run's file and take nothing of it"),
         ("services", "that share the database"),
         ("database", f"`{TEMPORARY}`: on a server that is started for it; or an address; left out: a file"),
     ):

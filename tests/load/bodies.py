@@ -4,6 +4,7 @@ import gzip
 import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -138,3 +139,18 @@ def _file_post(
         path.write_bytes(packed)
     stated = {"kind": run.kind.value, "cycles": run.cycles, "run_id": run.run_id, "origin": "simulated"}
     return Post(run_id=run.run_id, kind=run.kind.value, parameters=stated | {"filename": path.name}, path=path)
+
+
+def long_file() -> bytes:
+    """A recorder's file of a test at eight speeds, 400,000 rows."""
+    rng, rows = np.random.default_rng(1), 400_000
+    speed = 20.0 + 200.0 * (np.arange(rows) // (rows // 8))
+    columns = (
+        np.arange(rows) / 1000,
+        rng.normal(5.0, 0.01, rows),
+        rng.normal(speed, 0.1),
+        rng.normal(21.0 - speed / 2000, 0.05),
+    )
+    text = StringIO("")
+    np.savetxt(text, np.column_stack(columns), fmt="%.6f", delimiter=",")
+    return f"time [s],p [bar],n [rpm],torque [Nm]\n{text.getvalue()}".encode()

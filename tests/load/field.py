@@ -1,6 +1,7 @@
 """The test field: rigs that post life after life, clients that ask once a second, and what is counted of them.
 
-Beside them a clutch is diagnosed again and again, fleets are refreshed, and memory is watched.
+Beside them a clutch is diagnosed again and again, fleets are refreshed, and memory is watched. Slow readers ask for a run's
+file of some 15 MB and take nothing of it.
 
 A rig begins at a moment of its own, and sends its next run when the last one's receipt has come (closed loop). A client's
 questions are planned by the clock (open loop): each is measured from the moment at which it was to be sent, whether or not
@@ -11,6 +12,7 @@ it.
 import asyncio
 import itertools
 import random
+import socket
 import sys
 from collections import Counter, defaultdict
 from collections.abc import AsyncIterator, Awaitable, Sequence
@@ -18,6 +20,7 @@ from dataclasses import dataclass, field
 
 from httpx2 import AsyncClient, Limits, Response, TimeoutException, TransportError
 
+from service.web.limits import TAKEN_SECONDS
 from tests.benchmarks.memory import family, resident
 from tests.load.bodies import SAMPLES, TESTS, Post, Request, posted, registration
 from tests.support import Server
@@ -35,6 +38,8 @@ _PAUSE = 1.0
 DIAGNOSED = "diagnosed"
 #: Seconds between two looks at a diagnosis, between two refreshes, and between two looks at the memory.
 LOOK_EVERY, REFRESH_EVERY, WATCH_EVERY = 0.5, 20.0, 1.0
+#: The file that slow readers ask for, and seconds after which each asks again: the service has cut it off before.
+SLOWLY_READ, SLOW_SECONDS = "/v1/clutches/slowly-read/runs/file/file", TAKEN_SECONDS + 5.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,7 +55,7 @@ class Options:
     """The load's size; `interval`: seconds from one run of a rig to its next, at least.
 
     Where a test asks for it, `tests` in a life, `samples` of a raw file and `states` of the diagnosed clutch are fewer, and
-    services are forked off a loaded process (`loaded`).
+    services are forked off a loaded process (`loaded`). `slow` readers ask for a file and take nothing of it.
     `services` share a `database`, an address; empty: one service, on a file.
     """
 
@@ -60,6 +65,7 @@ class Options:
     seed: int = 1
     raw: bool = False
     interval: float = 0.52
+    slow: int = 0
     tests: int = TESTS
     samples: int = SAMPLES
     states: int = 10
@@ -96,6 +102,8 @@ class Counts:
     held: int = 0
     diagnoses: list[float] = field(default_factory=list)
     refreshes: list[float] = field(default_factory=list)
+    #: How the answers to slow readers began, or that there was none.
+    slow: Counter[str] = field(default_factory=Counter)
     #: Bytes by second: the services alone, and with the processes that they have started.
     alone: list[int] = field(default_factory=list)
     together: list[int] = field(default_factory=list)
@@ -140,6 +148,7 @@ class Field:
         for number in range(self.options.clients):
             phase = rng.random()
             tasks += [self._client(number, phase, part) for part in range(len(ROUTES))]
+        tasks += [self._read_slowly() for _ in range(self.options.slow)]
         return [*tasks, self._livez(), self._diagnose(), self._refresh_fleets(), self._watch()]
 
     def _line(self, number: int) -> AsyncClient:
@@ -302,6 +311,21 @@ class Field:
         if process.returncode != 0:
             said = errors[-160:].decode(errors="replace")
             self.counts.problems[f"fleet refresh ended with {process.returncode}: {said}"] += 1
+
+    async def _read_slowly(self) -> None:
+        """Ask for a file and take nothing of it, again and again."""
+        loop, request = asyncio.get_running_loop(), f"GET {SLOWLY_READ} HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n".encode()
+        while loop.time() < self.end:
+            with socket.socket() as line:
+                line.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 12)
+                line.setblocking(False)
+                await loop.sock_connect(line, ("127.0.0.1", self.servers[0].port))
+                await loop.sock_sendall(line, request)
+                await asyncio.sleep(min(SLOW_SECONDS, self.end - loop.time()))
+                try:
+                    self.counts.slow[line.recv(12).decode()] += 1
+                except OSError:
+                    self.counts.slow["none"] += 1
 
     async def _watch(self) -> None:
         """Resident memory of the services, alone and with their processes, once a second."""

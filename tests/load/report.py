@@ -87,6 +87,7 @@ def totals(counts: Counts) -> list[str]:
         "GETs not asked by the end": counts.unasked,
         "diagnoses finished, s": _spread(counts.diagnoses),
         "fleet refreshes, s": _spread(counts.refreshes),
+        "answers to slow readers": ", ".join(f"{count} {began}" for began, count in counts.slow.most_common()) or "0",
         "memory at half and at the end, MB": (
             f"alone {_mb(counts.alone, half)} and {_mb(counts.alone, -1)}, "
             f"with its processes {_mb(counts.together, half)} and {_mb(counts.together, -1)}"

@@ -15,9 +15,10 @@ from typing import IO, Any
 import numpy as np
 from alembic.config import Config
 from numpy.typing import NDArray
-from sqlalchemy import Connection, text
+from sqlalchemy import Connection, text, true
 
 from storage import channels, clutches, runs
+from storage.checksums import allow_damage, amend
 from storage.clutches import ClutchRow
 from storage.diagnoses import DiagnosisRow
 from storage.engine.database import Database
@@ -25,6 +26,7 @@ from storage.engine.opening import open_database
 from storage.migrations import upgrade as migrations
 from storage.results import FitRow
 from storage.runs import RunRow
+from storage.tables import CHECKSUM, metadata
 
 CLUTCH = "bench3-017"
 
@@ -198,7 +200,17 @@ def integrity(path: Path) -> list[str]:
         return problems + [str(row) for row in connection.execute("PRAGMA foreign_key_check")]
 
 
+def reseal(connection: Connection) -> None:
+    """Give every row the checksum of what it holds."""
+    allow_damage(connection, everywhere=True)
+    for table in metadata.sorted_tables:
+        if CHECKSUM in table.c:
+            amend(connection, table, [true()])
+
+
 def take_back(connection: Connection) -> None:
     """Bring a server's database to OLD, keeping what it holds."""
     connection.exec_driver_sql("ALTER TABLE clutch DROP COLUMN IF EXISTS later")
+    for table in metadata.tables:
+        connection.exec_driver_sql(f"ALTER TABLE {table} DROP COLUMN IF EXISTS checksum")
     connection.execute(text("UPDATE alembic_version SET version_num = :before"), {"before": OLD})

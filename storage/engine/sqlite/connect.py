@@ -33,7 +33,7 @@ from sqlalchemy.exc import TimeoutError as PoolTimeoutError
 from sqlalchemy.pool import ConnectionPoolEntry, NullPool, QueuePool
 
 from storage.engine.database import translated_by
-from storage.engine.errors import DatabaseBusy, ServiceRuns, StorageError, StorageUnavailable
+from storage.engine.errors import DamagedData, DatabaseBusy, ServiceRuns, StorageError, StorageUnavailable
 
 #: Its owner reads and writes, nobody else does either.
 MODE = 0o600
@@ -71,6 +71,8 @@ def _store_error(path: Path, error: Exception) -> StorageError | None:
         return DatabaseBusy(f"{path}: no free connection ({error})")
     origin = error.orig if isinstance(error, DBAPIError) else error
     code = getattr(origin, "sqlite_errorcode", None)
+    if code is None and "decode" in str(origin):  # text that is none: the driver gives it no code
+        return DamagedData(f"the database holds text that is none: {str(origin).partition(' with text')[0]}")
     if code is None:
         return None
     primary = code & 0xFF

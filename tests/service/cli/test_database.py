@@ -48,7 +48,8 @@ def test_commands_that_read_leave_an_older_file_as_it_is(tmp_path: Path) -> None
     before, url = path.read_bytes(), ("--database", f"sqlite:///{path}")
     names = sorted(each.name for each in tmp_path.iterdir())
     clutchlife("backup", tmp_path / "copy.db", *url)
-    assert "no prior has been learned" in clutchlife("fleet", *url)
+    assert "no key exists" in clutchlife("key", "list", *url)
+    assert f"is at revision {OLD}, this program needs" in clutchlife("fleet", *url, code=1)
     assert f"is at revision {OLD}: its runs can be checked only at" in clutchlife("verify", *url, code=1)
     assert path.read_bytes() == before
     assert sorted(each.name for each in tmp_path.iterdir()) == ["copy.db", *names]

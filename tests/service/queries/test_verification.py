@@ -10,10 +10,11 @@ from fastapi.testclient import TestClient
 
 from service.queries.verification import Checked, check_inspections, check_results, check_runs
 from storage.engine.database import Database
-from storage.engine.opening import find_database
+from storage.engine.opening import find_database, open_database
 from storage.engine.sqlite.database import back_up
 from tests.service.clients import client_of, clutchlife, post_run
 from tests.service.web.routes.surfaces import FRESH, WORN, inspected, png, sha256
+from tests.storage.samples import reseal
 from tests.support import stationary
 
 BASE = "/v1/clutches/c1"
@@ -37,8 +38,11 @@ def life(stored: Path, tmp_path: Path) -> str:
 
 
 def execute(url: str, statement: str) -> None:
+    """Change rows, and their checksums with them: as if the program had stored them so."""
     with closing(sqlite3.connect(url.removeprefix("sqlite:///"))) as connection, connection:
         assert connection.execute(statement).rowcount > 0
+    with closing(open_database(url)) as database, database.writing() as connection:
+        reseal(connection)
 
 
 def checked(url: str, check: Callable[[Database, str], Checked]) -> Checked:

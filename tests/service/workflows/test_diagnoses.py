@@ -28,6 +28,7 @@ from tests.service.clients import client_on, post_run
 from tests.service.work.replaying import replay_clutch
 from tests.service.work.waiting import until
 from tests.service.workflows import stand_in_engine
+from tests.storage.samples import reseal
 from tests.support import post_tests
 
 BASE = "/v1/clutches/c1"
@@ -389,6 +390,8 @@ def left_running(folder: Path, *, attempts: int) -> None:
             "UPDATE job SET state = 'running', claimed_by = 'dead', leased_until = 1e12, finished_at = NULL, attempts = ?",
             (attempts,),
         )
+    with closing(open_database(f"sqlite:///{folder / 'a.db'}")) as database, database.writing() as written:
+        reseal(written)
 
 
 def test_what_a_dead_service_left_running_is_made_by_the_next_and_given_up_at_last(tmp_path: Path) -> None:

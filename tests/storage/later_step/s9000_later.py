@@ -4,7 +4,7 @@ import sqlalchemy as sa
 from alembic import op
 
 revision = "s9000_later"
-down_revision: str | None = "s0003_laws_of_ended_lives"
+down_revision: str | None = "s0004_checksums"
 
 
 def upgrade() -> None:

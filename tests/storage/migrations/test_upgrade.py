@@ -89,6 +89,7 @@ def test_an_older_file_is_brought_up_keeps_what_it_holds_and_is_kept_as_it_was(t
         assert migrations.current(connection) == migrations.head() == "s9000_later"
         (row,) = connection.exec_driver_sql("SELECT clutch_id, later FROM clutch").fetchall()
         assert tuple(row) == (CLUTCH, None)
+        assert clutches.get(connection, CLUTCH) is not None, "it has its checksum"
         diagnoses.insert(connection, new_diagnosis(0))
         assert diagnoses.running(connection, CLUTCH, 1) == ["d0"]
     kept = path.with_name(f"old.db-before-{migrations.head()}")
@@ -155,7 +156,7 @@ def test_a_step_that_fails_leaves_the_file_empty(tmp_path: Path) -> None:
 def test_a_step_that_breaks_references_is_undone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def breaking(connection: object) -> None:
         migrations.upgrade(connection)  # type: ignore[arg-type]
-        connection.exec_driver_sql("INSERT INTO prediction VALUES ('nobody', 'q', 0, 0, '{}', '')")  # type: ignore[attr-defined]
+        connection.exec_driver_sql("INSERT INTO prediction VALUES ('nobody', 'q', 0, 0, '{}', '', 0)")  # type: ignore[attr-defined]
 
     monkeypatch.setattr("storage.engine.sqlite.database.upgrade", breaking)
     with pytest.raises(StorageUnavailable, match="refer to missing rows"):

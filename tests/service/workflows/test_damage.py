@@ -1,0 +1,141 @@
+"""A damaged value is never taken for what was stored: it is found, and computed again from the runs."""
+
+import shutil
+import sqlite3
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import pytest
+from fastapi.testclient import TestClient
+
+from tests.service.clients import client_of, client_on, clutchlife, post_run
+from tests.support import post_tests, stationary
+
+CYCLES = (0.0, 1000.0, 2000.0, 3000.0, 4000.0)
+NEXT = stationary(5000.0, run_id="next")
+
+
+@pytest.fixture(scope="module")
+def stored(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two clutches that are tracked."""
+    path = tmp_path_factory.mktemp("stored") / "a.db"
+    with client_of(path) as client:
+        assert client.post("/v1/clutches", json={"clutch_id": "c2"}).status_code == 201
+        for name in ("c1", "c2"):
+            post_tests(client, *CYCLES, to=name)
+    return path
+
+
+@pytest.fixture
+def path(stored: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copy(stored, tmp_path / "copy.db"))
+
+
+def damage(path: Path, statement: str) -> None:
+    with closing(sqlite3.connect(path)) as connection, connection:
+        assert connection.execute(statement).rowcount > 0
+
+
+def answers(client: TestClient) -> list[Any]:
+    """What is said of the clutch after its next test, without what says when."""
+    receipt = post_run(client, NEXT)
+    (listed,) = client.get("/v1/clutches?find=c1").json()["items"]
+    remaining = client.get("/v1/clutches/c1/remaining-useful-life").json()
+    del receipt["received_at"], remaining["revision"]
+    return [receipt, remaining, listed["summary"], listed["state"]]
+
+
+@pytest.fixture(scope="module")
+def intact(stored: Path, tmp_path_factory: pytest.TempPathFactory) -> list[Any]:
+    path = shutil.copy(stored, tmp_path_factory.mktemp("intact") / "copy.db")
+    with client_on(f"sqlite:///{path}") as client:
+        return answers(client)
+
+
+#: What follows from runs, and how it is damaged.
+RESULTS = {
+    "a bit of a particle filter": "UPDATE filter_state SET arrays = substr(arrays, 1, 999) || x'aa' || substr(arrays, 1001)"
+    " WHERE clutch_id = 'c1' AND method = 'particle'",
+    "a state cut off": "UPDATE filter_state SET arrays = x'00' WHERE clutch_id = 'c1'",
+    "a digit of a summary": "UPDATE clutch SET summary = replace(summary, 'at_least\":', 'at_least\":9')"
+    " WHERE clutch_id = 'c1'",
+    "a summary cut off": "UPDATE clutch SET summary = substr(summary, 1, 20) WHERE clutch_id = 'c1'",
+    "the last prediction": "UPDATE prediction SET payload = '{}' WHERE clutch_id = 'c1' AND cycles = 4000",
+}
+
+
+@pytest.mark.parametrize("what", RESULTS)
+def test_a_damaged_result_is_computed_again_before_the_next_test_is_tracked(
+    path: Path, what: str, intact: list[Any], caplog: pytest.LogCaptureFixture
+) -> None:
+    """The next test was tracked from it, or refused for ever."""
+    damage(path, RESULTS[what])
+    said = clutchlife("verify", "--database", f"sqlite:///{path}", code=1)
+    assert "c1: " in said
+    assert "10 runs of 2 clutches were checked" in said
+    assert "c2" not in said
+    with client_on(f"sqlite:///{path}") as client:
+        assert answers(client) == intact
+    assert any("again from its runs" in record.getMessage() for record in caplog.records)
+    assert "0 findings" in clutchlife("verify", "--database", f"sqlite:///{path}")
+
+
+def test_a_damaged_clutch_is_listed_as_such_beside_the_others(path: Path) -> None:
+    """It was listed with nine times its safe bound."""
+    damage(path, RESULTS["a digit of a summary"])
+    with client_on(f"sqlite:///{path}") as client:
+        items = {item["clutch_id"]: item for item in client.get("/v1/clutches").json()["items"]}
+        assert (items["c1"]["state"]["name"], items["c1"]["summary"]) == ("check", None)
+        assert "its stored results are damaged" in items["c1"]["state"]["why"]
+        assert "clutchlife replay" in items["c1"]["action"]
+        assert items["c2"]["summary"] is not None
+        alone = client.get("/v1/clutches/c1")
+        assert (alone.status_code, alone.json()["type"]) == (503, "urn:clutchlife:problem:damaged")
+        assert client.get("/v1/clutches/c2").status_code == 200
+    clutchlife("replay", "c1", "--database", f"sqlite:///{path}")
+    with client_on(f"sqlite:///{path}") as client:
+        assert client.get("/v1/clutches/c1").json()["summary"] == items["c2"]["summary"]
+
+
+@pytest.mark.parametrize(
+    "statement",
+    [
+        "UPDATE fit SET covariance = substr(covariance, 1, 20) WHERE run_key = 2",
+        "UPDATE fit SET mean_cof = 1.01 * mean_cof WHERE run_key = 2",
+        "UPDATE run SET receipt = cast(x'7bff7d' AS TEXT) WHERE clutch_id = 'c1' AND run_id = 'r2000'",
+        "UPDATE run SET receipt = '{' WHERE clutch_id = 'c1' AND run_id = 'r2000'",
+        "UPDATE prediction SET payload = '[' WHERE clutch_id = 'c1' AND cycles = 2000",
+    ],
+)
+def test_verify_says_of_each_clutch_what_is_damaged(path: Path, statement: str) -> None:
+    """One unreadable value ended it with a traceback, and the other clutches were not looked at."""
+    damage(path, statement)
+    damage(path, "UPDATE channel SET data = zeroblob(9) WHERE run_key = 7 AND position = 0")
+    said = clutchlife("verify", "--database", f"sqlite:///{path}", code=1).splitlines()
+    assert any(line.startswith("c1: ") for line in said), said
+    assert any(line.startswith("c2: run r1000 is damaged") for line in said), said
+
+
+def test_a_replay_mends_results_and_leaves_what_was_sent(path: Path) -> None:
+    url = f"sqlite:///{path}"
+    damage(path, "UPDATE fit SET mean_cof = 1.01 * mean_cof WHERE run_key = 2")
+    damage(path, "UPDATE run SET receipt = '{' WHERE clutch_id = 'c1' AND run_id = 'r2000'")
+    damage(path, "UPDATE prediction SET payload = '[' WHERE clutch_id = 'c2'")
+    clutchlife("replay", "--database", url)
+    assert "0 findings" in clutchlife("verify", "--database", url)
+    damage(path, "UPDATE run SET cycles = cycles + 1 WHERE clutch_id = 'c1' AND run_id = 'r2000'")
+    assert "c1: not replayed" in clutchlife("replay", "c1", "--database", url, code=1)
+    assert "c1: run (run_key 3) is not what was stored" in clutchlife("verify", "--database", url, code=1)
+
+
+def test_a_clutch_of_which_the_record_is_damaged_takes_no_run(path: Path) -> None:
+    damage(
+        path,
+        "UPDATE clutch SET record = replace(record, '\"friction_faces\":2', '\"friction_faces\":4') WHERE clutch_id = 'c1'",
+    )
+    with client_on(f"sqlite:///{path}") as client:
+        refused = client.post("/v1/clutches/c1/runs", json=NEXT)
+        assert (refused.status_code, refused.json()["type"]) == (503, "urn:clutchlife:problem:damaged")
+        assert "restore a backup" in refused.json()["detail"]
+        assert post_run(client, NEXT, "c2")["state"] == "accepted"
