@@ -10,8 +10,8 @@ import shutil
 import tempfile
 from collections.abc import AsyncIterable, AsyncIterator, Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
-from contextlib import AbstractAsyncContextManager, asynccontextmanager
-from functools import partial
+from contextlib import AbstractAsyncContextManager, asynccontextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any, BinaryIO
 
@@ -130,18 +130,49 @@ def preferred(request: Request, media_types: Sequence[str]) -> str:
     return max(media_types, key=lambda name: weights.get(name, 0.0))
 
 
+@dataclass(slots=True)
+class _Made:
+    """A copy that is being made or sent, and how many answers it is for."""
+
+    making: "asyncio.Task[Copy]"
+    users: int = 0
+
+
 class Copies:
     """Copies of runs and their files, made in a folder to be sent: at most `most` bytes together, and a share of what is
-    free on the disk."""
+    free on the disk. Readers of the same content share one."""
 
     def __init__(self, folder: Path, most: int) -> None:
         self._folder = folder
         self._most = most
         self._room = Room(most)
+        self._made: dict[str, _Made] = {}
+        self._ending: set[asyncio.Task[None]] = set()
 
-    async def made(self, make: Callable[[Path], "Future[Any]"]) -> tuple["Copy", Any]:
-        """What `make` writes, as an open file whose name is gone, and what it returns. Raises BusyError where the copies
-        that are being sent leave no room."""
+    async def of(self, tag: str, make: Callable[[Path], "Future[Any]"]) -> "Copy":
+        """The copy of that tag, to be sent; `make` writes it where there is none. Raises BusyError where the copies that are
+        being sent leave no room."""
+        made = self._made.get(tag)
+        if made is None:
+            made = self._made[tag] = _Made(asyncio.create_task(self._written(tag, make)))
+        made.users += 1
+        try:
+            return await asyncio.shield(made.making)
+        except BaseException:
+            self.leave(tag)
+            raise
+
+    def leave(self, tag: str) -> None:
+        """An answer needs a copy no more; it is closed, in a thread, where none does."""
+        made = self._made[tag]
+        made.users -= 1
+        if not made.users:
+            del self._made[tag]
+            ending = asyncio.create_task(self._end(made.making))
+            self._ending.add(ending)
+            ending.add_done_callback(self._ending.discard)
+
+    async def _written(self, tag: str, make: Callable[[Path], "Future[Any]"]) -> "Copy":
         if self._room.left <= 0:
             raise BusyError(_NO_ROOM)
         async with temporary_folder(self._folder) as folder:
@@ -150,9 +181,15 @@ class Copies:
             file, size, free = await run_in_threadpool(_measured, path)
         held = self._most - self._room.left + size
         if held > COPIES_SHARE * (free + held) or not self._room.take(size):
-            file.close()
+            await run_in_threadpool(file.close)
             raise BusyError(_NO_ROOM)
-        return Copy(file, size, lambda: self._room.take(-size)), returned
+        return Copy(self, tag, file, size, returned)
+
+    async def _end(self, making: "asyncio.Task[Copy]") -> None:
+        with suppress(Exception):  # who has asked for it was told
+            copy = await making
+            await run_in_threadpool(copy.file.close)
+            self._room.take(-copy.size)
 
 
 _NO_ROOM = "the copies of runs that are being sent use all available room on the disk: try again later"
@@ -164,31 +201,35 @@ def _measured(path: Path) -> tuple[BinaryIO, int, int]:
     return file, os.fstat(file.fileno()).st_size, shutil.disk_usage(path.parent).free
 
 
+@dataclass(frozen=True, slots=True)
 class Copy:
-    """An open file that is sent once."""
+    """An open file without a name, and what was returned by what wrote it."""
 
-    def __init__(self, file: BinaryIO, size: int, end: Callable[[], object]) -> None:
-        self._file, self._size, self._end = file, size, end
+    copies: Copies
+    tag: str
+    file: BinaryIO
+    size: int
+    returned: Any
 
     def answer(self, media_type: str, headers: Mapping[str, str]) -> Response:
-        """The file piece by piece; closed at its end, or when the reader has gone."""
-        headers = dict(headers) | {"Content-Length": str(self._size)}
-        return _Sent(self, iter(partial(self._file.read, PIECE_BYTES), b""), media_type=media_type, headers=headers)
+        """The file piece by piece; left at its end, or when the reader has gone."""
+        headers = dict(headers) | {"Content-Length": str(self.size)}
+        return _Sent(self, media_type=media_type, headers=headers)
 
-    def close(self) -> None:
-        self._file.close()
-        self._end()
+    def pieces(self) -> Iterator[bytes]:
+        for start in range(0, self.size, PIECE_BYTES):
+            yield os.pread(self.file.fileno(), PIECE_BYTES, start)
 
 
 class _Sent(StreamingResponse):
     """The answer that sends a copy."""
 
-    def __init__(self, copy: Copy, pieces: Iterator[bytes], **more: Any) -> None:
-        super().__init__(pieces, **more)
+    def __init__(self, copy: Copy, **more: Any) -> None:
+        super().__init__(copy.pieces(), **more)
         self._copy = copy
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         try:
             await super().__call__(scope, receive, send)
         finally:
-            self._copy.close()
+            self._copy.copies.leave(self._copy.tag)

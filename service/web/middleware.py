@@ -174,6 +174,7 @@ class Edge(_OfRequests):
 
         try:
             await self.app(scope, receive, noting)
+            status = status or 499  # as below: the reader went before the answer began
         except ClientDisconnect:  # nobody is there to be answered
             status = 499  # as proxies log it
         except Exception as error:

@@ -39,6 +39,7 @@ DIAGNOSED = "diagnosed"
 #: Seconds between two looks at a diagnosis, between two refreshes, and between two looks at the memory.
 LOOK_EVERY, REFRESH_EVERY, WATCH_EVERY = 0.5, 20.0, 1.0
 #: The file that slow readers ask for, and seconds after which each asks again: the service has cut it off before.
+OTHER_ADDRESS = "127.0.0.2"
 SLOWLY_READ, SLOW_SECONDS = "/v1/clutches/slowly-read/runs/file/file", TAKEN_SECONDS + 5.0
 
 
@@ -318,6 +319,7 @@ class Field:
         while loop.time() < self.end:
             with socket.socket() as line:
                 line.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 12)
+                line.bind((OTHER_ADDRESS, 0))  # the rigs' address has a share of requests of its own
                 line.setblocking(False)
                 await loop.sock_connect(line, ("127.0.0.1", self.servers[0].port))
                 await loop.sock_sendall(line, request)

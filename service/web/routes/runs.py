@@ -4,7 +4,8 @@ A file is the body itself, or a form with a `file` part; it is kept on disk whil
 """
 
 import asyncio
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -25,6 +26,7 @@ from service.schemas.run import RUN_IN, Confirmation, Confirmations, Correction,
 from service.web import answers, files
 from service.web.auth import Ingester, Reader, grant_of
 from service.web.bodies import Takes, takes
+from service.web.context import Context
 from service.web.limits import LARGE_BODY_BYTES
 from service.web.problems import READING, SENDING, described
 from service.work.workers import Lane
@@ -103,11 +105,20 @@ async def read_run_file(of: answers.Of, run_id: parameters.RunId) -> Response:
     headers = {"Cache-Control": "no-cache", "ETag": f'"{sha256}"', "Content-Disposition": "attachment"}
     if held := answers.unchanged(of.request, headers):
         return held
-    submit = of.context.workers.submit
-    copy, _ = await of.context.copies.made(
-        lambda path: submit(Lane.RECORDS, partial(copy_file, path=path), of.clutch_id, run_id)
-    )
+    copy = await _copy(of.request, of.context, headers["ETag"], copy_file, of.clutch_id, run_id)
     return copy.answer(files.FILE_TYPE, headers)
+
+
+async def _copy(
+    request: Request, context: Context, tag: str, write: Callable[..., object], clutch_id: str, run_id: str
+) -> files.Copy:
+    """What `write` writes of a run; a caller's copies take turns, so that others' long records need not wait for them."""
+
+    def make(path: Path) -> "Future[object]":
+        turn = f"copies for {grant_of(request).name}"
+        return context.workers.submit(Lane.RECORDS, partial(write, path=path), clutch_id, run_id, turn=turn)
+
+    return await context.copies.of(tag, make)
 
 
 _PARQUET = {"schema": {"type": "string", "format": "binary"}}
@@ -182,10 +193,9 @@ async def read_run_with_channels(
     )
     if held := answers.unchanged(request, headers):
         return held
-    write, submit = partial(write_run, points=points, kind=kind, compressed=packed), context.workers.submit
-    copy, headers["ETag"] = await context.copies.made(
-        lambda path: submit(Lane.RECORDS, partial(write, path=path), clutch_id, run_id)
-    )
+    write = partial(write_run, points=points, kind=kind, compressed=packed)
+    copy = await _copy(request, context, headers["ETag"], write, clutch_id, run_id)
+    headers["ETag"] = copy.returned
     return copy.answer(media_type, headers | (files.PACKED if kind == "parquet" else {}))
 
 

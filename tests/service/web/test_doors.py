@@ -20,11 +20,12 @@ import httpx2
 import pytest
 from fastapi.testclient import TestClient
 
+from service.errors import BusyError
 from service.queries import scores
 from service.queries.raw_run import copy_file
 from service.web import bodies, files, limits
 from service.web.bodies import Takes
-from service.web.files import emptied_folder
+from service.web.files import Copies, emptied_folder
 from service.web.middleware import Answers
 from service.web.routes import inspections, rigs, runs
 from service.work.workers import Lane
@@ -246,29 +247,43 @@ def test_answers_that_nobody_reads_share_room_and_the_same_one_is_held_once() ->
     assert asyncio.run(answered(0, [b"short"] * 9)) == [200] * 9
 
 
-def test_copies_of_runs_share_the_room_on_the_disk(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Sixty readers of a file of 14 MiB filled a disk of 1 GiB."""
-    assert client.post(f"{ADDRESS}&run_id=a", content=TEXT).status_code == 201
-    copies = context_of(client).copies
-    address = f"{RUNS}/a/file"
-    assert client.get(address).text == TEXT
-    free = 3 * len(TEXT)
-    monkeypatch.setattr("service.web.files.shutil.disk_usage", lambda _: SimpleNamespace(free=free))
-    made = [asyncio.run(copies.made(partial(submitted, client)))[0] for _ in range(2)]
-    free = len(TEXT)
-    for path in (address, f"{RUNS}/a"):
-        refused = client.get(path)
-        assert (refused.status_code, refused.headers["Retry-After"]) == (503, "1")
-        assert "copies of runs" in refused.json()["detail"]
-    for copy in made:
-        copy.close()
-    free = 4 * len(TEXT)
-    assert client.get(address).text == TEXT
-    assert list(context_of(client).folder.iterdir()) == []
+async def copied(client: TestClient, free: list[int], *tags: str) -> list[int]:
+    """The bytes of copies that are held beside each other while so much of the disk is free, one after the other; in the end
+    all are left."""
+    copies, sizes = Copies(context_of(client).folder, 1 << 30), []
+    try:
+        for tag, left in zip(tags, free, strict=True):
+            with pytest.MonkeyPatch.context() as patched:
+                patched.setattr("service.web.files.shutil.disk_usage", lambda _, left=left: SimpleNamespace(free=left))
+                sizes.append((await copies.of(tag, partial(submitted, client))).size)
+    finally:
+        for tag in tags[: len(sizes)]:
+            copies.leave(tag)
+        while copies._ending:
+            await asyncio.sleep(0.001)
+    assert copies._room.left == 1 << 30
+    return sizes
 
 
 def submitted(client: TestClient, path: Path) -> Any:
     return context_of(client).workers.submit(Lane.RECORDS, partial(copy_file, path=path), "c1", "a")
+
+
+def test_copies_of_runs_share_the_room_on_the_disk(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Sixty readers of a file of 14 MiB filled a disk of 1 GiB."""
+    assert client.post(f"{ADDRESS}&run_id=a", content=TEXT).status_code == 201
+    size = len(TEXT)
+    assert asyncio.run(copied(client, [3 * size, 2 * size], "a", "b")) == [size, size]
+    with pytest.raises(BusyError, match="copies of runs"):
+        asyncio.run(copied(client, [3 * size, size], "a", "b"))
+    assert asyncio.run(copied(client, [3 * size, 0], "a", "a")) == [size, size], "the same is there once"
+    monkeypatch.setattr("service.web.files.shutil.disk_usage", lambda _: SimpleNamespace(free=size // 2))
+    for path in (f"{RUNS}/a/file", f"{RUNS}/a"):
+        refused = client.get(path)
+        assert (refused.status_code, refused.headers["Retry-After"]) == (503, "1")
+    monkeypatch.undo()
+    assert client.get(f"{RUNS}/a/file").text == TEXT
+    assert list(context_of(client).folder.iterdir()) == []
 
 
 def test_a_disk_that_does_not_answer_holds_up_no_probe(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
