@@ -370,7 +370,11 @@ def _learned_prior(
     version = None
     if tracked.get("severity") == severity_name(severity) and "prior" in tracked:
         version = tracked["prior"]["version"] or 0
-    row = assumptions.fleet_prior_for(connection, kind_of(own, severity), own.clutch_id, version)
+    try:
+        row = assumptions.fleet_prior_for(connection, kind_of(own, severity), own.clutch_id, version)
+    except DamagedData as error:
+        _log.warning("%s: the weak prior takes its place until the next clutchlife fleet refresh", error)
+        row = None
     if row is None:
         return LearnedPrior()
     fleet = FleetPrior.from_dict(row.content)

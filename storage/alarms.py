@@ -49,7 +49,9 @@ class EventRow:
         return CLEARED if self.cleared_at is not None else RAISED if self.acknowledged_at is None else ACKNOWLEDGED
 
 
-_rules, _events = Rows(AlarmRow, of=alarm), Rows(EventRow, key="event_key", of=alarm_event)
+# rules and events are read where runs are stored: a damaged one may raise a wrong alarm, but keeps no run out
+_rules = Rows(AlarmRow, of=alarm, checked=False)
+_events = Rows(EventRow, key="event_key", of=alarm_event, checked=False)
 _IN_STATE = {
     RAISED: NOT_CLEARED & alarm_event.c.acknowledged_at.is_(None),
     ACKNOWLEDGED: NOT_CLEARED & alarm_event.c.acknowledged_at.is_not(None),
@@ -145,7 +147,7 @@ def acknowledge(connection: Connection, event_id: str, *, at: str, by: str, note
 
 
 def _change_event(connection: Connection, event_id: str, **columns: str | None) -> None:
-    amend(connection, alarm_event, [alarm_event.c.event_id == event_id], **columns)
+    amend(connection, alarm_event, [alarm_event.c.event_id == event_id], checked=False, **columns)
 
 
 def last_heard(connection: Connection, clutch_ids: Collection[str]) -> dict[str, str]:

@@ -189,7 +189,7 @@ def set_silent(connection: Connection, clutch_id: str, silent: str | None, *, st
     _change(connection, clutch_id, {"silent": silent, "state": state})
 
 
-def _change(connection: Connection, clutch_id: str, columns: Mapping[str, object]) -> None:
+def _change(connection: Connection, clutch_id: str, columns: Mapping[str, Any]) -> None:
     if amend(connection, clutch, [clutch.c.clutch_id == clutch_id], **columns) != 1:
         raise LookupError(f"clutch {clutch_id!r} is not stored")
 

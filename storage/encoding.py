@@ -294,11 +294,11 @@ _CODINGS: dict[Any, _Coding] = {
 class Rows(Generic[Value]):
     """The rows that hold the fields of a dataclass, and perhaps other columns beside them; the database gives the `key`.
 
-    Whole rows `of` a table have their checksum.
+    Whole rows `of` a table have their checksum, and are `checked` for it when they are read.
     """
 
-    def __init__(self, kind: type[Value], *, key: str = "", of: Table | None = None) -> None:
-        self._kind, self._key, self._of = kind, key, of
+    def __init__(self, kind: type[Value], *, key: str = "", of: Table | None = None, checked: bool = True) -> None:
+        self._kind, self._key, self._of, self._checked = kind, key, of, checked
         hints = get_type_hints(kind)
         self.names = tuple(hints)
         codings = {name: _coding(hint) for name, hint in hints.items()}
@@ -324,7 +324,7 @@ class Rows(Generic[Value]):
         damage_allowed = table is not None and checksums.allows_damage(rows, table)
 
         def of(row: Row[*tuple[Any, ...]]) -> Value:
-            if table is not None and not damage_allowed:
+            if table is not None and self._checked and not damage_allowed:
                 checksums.refuse_damaged(table, dict(zip(columns, row, strict=True)))
             fields = dict(zip(self.names, fields_of(row), strict=True))
             for name, (_, decode) in self._coded.items():

@@ -28,6 +28,7 @@ from service.work.executor import Ended, Ending, Executor, in_rounds
 from service.work.workflow import Task
 from storage import assumptions, clutches, jobs, results
 from storage.assumptions import NOBODY, FleetPriorRow
+from storage.checksums import allow_damage
 from storage.encoding import Json, to_object
 from storage.engine.database import Database
 
@@ -151,6 +152,7 @@ def _fleets(
 ) -> dict[str, Fleet]:
     """The fleets with what their clutches teach, by kind; `advance` is called for each clutch."""
     with database.reading() as connection:
+        allow_damage(connection, everywhere=True)  # versions alone
         versions = {
             assumptions.fleet_key(row.fleet): row.version for row in assumptions.current_fleet_priors(connection)
         }
@@ -255,11 +257,13 @@ def _stored_again(database: Database, fleet: Fleet, now: str, executor: Executor
     """
     (learned,) = executor.map(learned_without, [(fleet, ())])
     with database.reading() as connection:
+        allow_damage(connection, everywhere=True)  # it is replaced
         stored = assumptions.current_fleet_prior(connection, fleet.kind)
     if learned.value() is None or (stored is not None and stored.content == learned.value()):
         return Ending.NOTHING
     rows = _versions(fleet, learned.value(), fleet.version + 1, now, executor)
     with database.writing() as connection:
+        allow_damage(connection, everywhere=True)
         newest = assumptions.current_fleet_prior(connection, fleet.kind)
         if newest is not None and newest.version > fleet.version:
             return Ending.LEFT

@@ -6,11 +6,12 @@ import pytest
 import sqlalchemy as sa
 from sqlalchemy import Connection
 
-from storage import checksums, clutches, results
+from storage import alarms, checksums, clutches, results
+from storage.alarms import AlarmRow
 from storage.checksums import allow_damage, amend, findings
 from storage.engine.errors import DamagedData
 from storage.results import FilterStateRow, PredictionRow
-from storage.tables import CHECKSUM, clutch, metadata, prediction
+from storage.tables import CHECKSUM, alarm, clutch, metadata, prediction
 from tests.storage.samples import CLUTCH, clutch_row, fit_row, store_run
 
 SEALED = [table for table in metadata.sorted_tables if CHECKSUM in table.c]
@@ -37,6 +38,15 @@ def test_any_column_that_changes_is_found(table: sa.Table) -> None:
     (key, *others) = table.primary_key
     given = not others and isinstance(key.type, sa.Integer)
     assert {name for name, _ in checksums.covered(table)} == row.keys() - ({key.name} if given else set())
+
+
+def test_a_damaged_rule_or_receiver_keeps_no_run_out(connection: Connection) -> None:
+    """They are read in the transaction that stores a run: verify alone names them."""
+    rule = AlarmRow(alarm_id="a", clutch_id=None, enabled=True, content={"a": 1}, saved_at="", saved_by="")
+    alarms.put(connection, rule)
+    connection.execute(sa.update(alarm).values(content='{"a":2}'))
+    assert alarms.enabled(connection) == [replace(rule, content={"a": 2})]
+    assert len(findings(connection, alarm, sa.true())) == 1
 
 
 def test_rows_written_and_changed_by_the_program_pass(connection: Connection) -> None:

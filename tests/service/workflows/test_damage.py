@@ -129,6 +129,16 @@ def test_a_replay_mends_results_and_leaves_what_was_sent(path: Path) -> None:
     assert "c1: run (run_key 3) is not what was stored" in clutchlife("verify", "--database", url, code=1)
 
 
+def test_a_damaged_rule_of_alarms_keeps_no_run_out_and_is_found(path: Path) -> None:
+    with client_on(f"sqlite:///{path}") as client:
+        assert client.post("/v1/alarms", json={"quantity": "remaining_cycles", "below": 1.0}).status_code == 201
+    damage(path, "UPDATE alarm SET saved_by = 'nobody'")
+    with client_on(f"sqlite:///{path}") as client:
+        assert post_run(client, NEXT)["state"] == "accepted"
+    said = clutchlife("verify", "--database", f"sqlite:///{path}", code=1)
+    assert "alarm (alarm_id" in said
+
+
 def test_a_clutch_of_which_the_record_is_damaged_takes_no_run(path: Path) -> None:
     damage(
         path,
