@@ -36,7 +36,7 @@ from tests.service.work.waiting import until
 from tests.service.workflows import stand_in_engine
 from tests.service.workflows.benches import Bench, body, stood_in
 from tests.storage.engine.postgresql.server import PostgresServer, postgresql_server
-from tests.storage.samples import OLD, integrity, old_database, read_from, revision
+from tests.storage.samples import OLD, integrity, old_database, read_from, reseal, revision
 from tests.support import ONCE, Server, one_quick, serving, stationary
 
 #: Channels of runs, bit for bit, by clutch and run.
@@ -233,6 +233,7 @@ def test_a_restore_that_is_killed_leaves_one_of_the_two_whole(tmp_path: Path, fi
     back_up(url, backup)
     with closing(open_database(url)) as database, database.writing() as connection:
         connection.exec_driver_sql("UPDATE clutch SET created_at = 'since'")
+        reseal(connection)
     back_up(url, tmp_path / "since.db")
     for _ in kills_of(lambda: restore(url, backup), number, lambda: lay_again(filled, tmp_path / "since.db")):
         assert integrity(filled) == ["ok"]

@@ -19,6 +19,7 @@ from storage.engine.database import Database
 from storage.tables import filter_state, fit, prediction
 from storage.transfer import digest
 from tests.service.work.waiting import until
+from tests.storage.samples import reseal
 from tests.support import ONCE, Server, stationary
 
 AT = "2026-11-02T10:00:00+00:00"
@@ -82,6 +83,7 @@ def age(database: Database) -> None:
         for table in RESULTS:
             connection.execute(table.update().values(code_version=OLD))
         connection.execute(text("UPDATE fit SET mean_cof = 0.25"))
+        reseal(connection)
 
 
 def aged(database: Database) -> set[str]:
