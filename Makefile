@@ -25,7 +25,8 @@
 # make load     rigs and clients against a running service, what they wait and what is lost: a table of docs/appendix/benchmarks.md
 #              (ARGS="--seconds 60 --no-raw"; "--slow 60"; "--services 4 --database postgresql --rigs 16 --clients 40 --no-raw"); a few
 #              minutes, on a machine that does nothing else
-# make scale    requests and commands with 1,000 clutches of 200 tests in one file, beside 10: a table of docs/appendix/scale.md
+# make scale    requests and commands with 1,000 clutches of 200 tests in one file, beside 10, and with a life of 1,000 tests,
+#              beside 100: tables of docs/appendix/scale.md; fails where the long life costs more than is wanted
 #              (ARGS="--clutches 10000 --states 5"); needs 7 GB of disk. python -m tests.scale.replay --clutches 300: a replay
 #              in one process, in a pool and on a Dask cluster of which a worker is killed
 # make plausibility  sends mistyped and honest runs: the tables of docs/appendix/plausibility.md; STORE=FILE goes on where it
@@ -127,6 +128,7 @@ load: $(VENV)/.tests
 
 scale: $(VENV)/.tests
 	$(BIN)/python -m tests.scale $(ARGS)
+	$(BIN)/python -m tests.scale.long_life
 
 real: $(VENV)/.tests
 	$(BIN)/python -m tests.real $(ARGS)

@@ -5,28 +5,26 @@ A workflow reads a `ClutchState`, computes outside any transaction, and stores w
 
 from __future__ import annotations
 
-import json
 import logging
 import secrets
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from sqlalchemy import Connection
 
 from models.degradation.severity import Severity
-from models.friction.criteria import ACCEPTABLE_MSE
-from models.friction.identification import FitStatus, StribeckFit
-from models.friction.stribeck import PARAMETER_NAMES, StribeckParameters
+from models.friction.stribeck import PARAMETER_NAMES
 from models.prognosis.ended_lives import EndedLife
 from models.prognosis.fleet import FleetPrior
 from service.alarms import raising
 from service.columns import content_of, instant, whole
 from service.errors import BusyError, NotFoundError, unknown_clutch
+from service.kept_history import FIT_COLUMNS, event_of, history
+from service.kept_history import levels as levels_of
 from service.lives.assumptions import ALL_PRESSURES, FLEET, LearnedPrior, kind_of, severity_name, severity_under
 from service.lives.condition import DISAGREES, rank_of, state_of, top_line
-from service.lives.history import ByPressure, Event, Shown, duty_block, maintenance_fields, moment_of, order
+from service.lives.history import ByPressure, Event, order
 from service.lives.model_correction import extension_of
 from service.lives.payloads import notice_items
 from service.lives.plausibility.doubts import Judged
@@ -50,7 +48,7 @@ from storage.inspections import InspectionRow, PhotographRow
 from storage.jobs import JobRow
 from storage.results import FilterStateRow, FitRow, PredictionRow
 from storage.rigs import RigRow
-from storage.runs import RunInOrder, RunRow
+from storage.runs import RunRow
 
 if TYPE_CHECKING:
     from models.diagnosis.extension import Extension
@@ -62,8 +60,6 @@ _log = logging.getLogger("clutchlife")
 MAX_ATTEMPTS = 16
 #: Who changes the state of a run where other runs do.
 BY_EVIDENCE = "evidence"
-#: Columns of a stored fit that are a fit's own.
-_FIT_COLUMNS = ("pressure", "undetermined", "noise", "mse_percent", "rmse", "points", "message")
 
 
 def clutch(connection: Connection, clutch_id: str) -> ClutchRow:
@@ -124,6 +120,7 @@ def state(
     row = clutch(connection, clutch_id)
     if damaged and content_of(row.record) != row.content_sha256:
         raise DamagedData(f"the record of clutch {clutch_id!r} is damaged: restore a backup")
+    past = history(connection, row)
     own, adoptions = edited or record(row), _adoptions(connection, clutch_id)
     extensions = [also, *(None if adopted is None else adopted.extension for adopted in adoptions)]
     exponents = {None, *(extension.severity_exponent for extension in extensions if extension is not None)}
@@ -133,11 +130,11 @@ def state(
     return ClutchState(
         record=own,
         revision=row.revision,
-        events=events(connection, clutch_id),
+        events=past.events,
         adoptions=adoptions,
         priors={severity: _learned_prior(connection, own, severity, tracked) for severity in severities},
         filters=_filters(connection, clutch_id) if carried else None,
-        held=held(connection, clutch_id),
+        held=past.held,
         summary={} if damaged else row.summary,
     )
 
@@ -168,37 +165,23 @@ def _adoptions(connection: Connection, clutch_id: str) -> tuple[Adoption | None,
 
 def present_life(connection: Connection, clutch_id: str) -> str:
     """The name of the present life: the run_id of the rebuild that began it, "" where there was none."""
-    rebuilds = order([_event(row, {}) for row in runs.rebuilds(connection, clutch_id)])
+    rebuilds = order([event_of(row, {}) for row in runs.rebuilds(connection, clutch_id)])
     return rebuilds[-1].run_id if rebuilds else ""
 
 
 def events(connection: Connection, clutch_id: str) -> tuple[Event, ...]:
     """All accepted runs of a clutch as its history sees them, ordered; mean COF as the model in force corrects it."""
-    cofs, corrected = results.cofs_of(connection, clutch_id), assumptions.corrected_cofs_of(connection, clutch_id)
-    levels = clutch(connection, clutch_id).summary.get("new_levels", ())
-    accepted = [
-        _event(row, cofs.get(row.run_key, {})).corrected(corrected.get(row.run_key))
-        for row in runs.in_order(connection, clutch_id)
-    ]
-    return order([replace(event, new_level=event.run_id in levels) for event in accepted])
-
-
-def held(connection: Connection, clutch_id: str) -> tuple[Event, ...]:
-    """The runs that are held, ordered, with the mean COFs that they would have in the history."""
-    rows = runs.held_of(connection, clutch_id)
-    cofs = results.cofs_of(connection, clutch_id) if rows else {}
-    return order([replace(_event(row, cofs.get(row.run_key, {})), confirmed=False) for row in rows])
+    return history(connection, clutch(connection, clutch_id)).events
 
 
 def set_aside(connection: Connection, clutch_id: str) -> dict[str, Event]:
     """The runs that are held or were withdrawn by run_id, as the history would see them; their mean COFs yet to come."""
-    return {row.run_id: replace(_event(row, {}), confirmed=False) for row in runs.set_aside(connection, clutch_id)}
+    return {row.run_id: replace(event_of(row, {}), confirmed=False) for row in runs.set_aside(connection, clutch_id)}
 
 
 def levels(connection: Connection, clutch_id: str) -> dict[str, list[LevelFit]]:
-    names = {run_key: run_id for run_id, run_key in runs.keys(connection, clutch_id).items()}
-    of_runs = results.fits_of(connection, clutch_id)
-    return {names[run_key]: [_level_fit(row) for row in rows] for run_key, rows in of_runs.items()}
+    """The fits of all runs of a clutch, by run_id."""
+    return levels_of(connection, clutch_id)
 
 
 def receipt(row: RunRow) -> dict[str, Any]:
@@ -223,9 +206,10 @@ def receipts(connection: Connection, clutch_id: str) -> dict[str, dict[str, Any]
 
 
 def answers(connection: Connection, clutch_id: str) -> list[Any]:
-    """Receipts, predictions and summary as they are stored: whether they have changed decides on a new revision."""
+    """Receipts, predictions, summary and history as they are stored: whether they have changed decides on a new revision."""
     tracks = [results.predictions_of(connection, clutch_id, method, ALL_PRESSURES) for method in CARRIED]
-    return [receipts(connection, clutch_id), tracks, clutch(connection, clutch_id).summary]
+    past = history(connection, clutch(connection, clutch_id))
+    return [receipts(connection, clutch_id), tracks, clutch(connection, clutch_id).summary, past.events, past.held]
 
 
 def store_change(connection: Connection, clutch_id: str, computed: Results, *, by: str, at: str) -> int:
@@ -384,25 +368,6 @@ def _learned_prior(
     )
 
 
-def _event(row: RunInOrder, cofs: ByPressure) -> Event:
-    low, high = row.lowest_speed, row.highest_speed
-    return Event(
-        run_id=row.run_id,
-        kind=row.kind,
-        cycles=row.cycles,
-        moment=moment_of(row.started_at, row.received_at),
-        arrived=row.run_key,
-        speed_range=None if low is None or high is None else (low, high),
-        oil_temperature=row.oil_temperature,
-        cofs=cofs,
-        **maintenance_fields(row.event, row.reason),
-        duty=duty_block(row.cycles, row.duty_cycles, row.duty_energy_kj, row.duty_speed_rpm, row.duty_duration_s),
-        dated=row.started_at is not None,
-        shown=None if row.shown is None else Shown.from_list(json.loads(row.shown)),
-        confirmed=bool(row.doubted),
-    )
-
-
 def fit_rows(own: Sequence[LevelFit], cofs: ByPressure) -> list[FitRow]:
     """Fits as they are stored, with mean COF by pressure where a level determines it."""
     rows = []
@@ -411,7 +376,7 @@ def fit_rows(own: Sequence[LevelFit], cofs: ByPressure) -> list[FitRow]:
         parameters: dict[str, Any] = {name: float(getattr(fit.parameters, name)) for name in PARAMETER_NAMES}
         mean_cof, mean_cof_sd = cofs.get(fit.pressure, (None, None))
         row = FitRow(
-            **{name: getattr(fit, name) for name in _FIT_COLUMNS},
+            **{name: getattr(fit, name) for name in FIT_COLUMNS},
             **parameters,
             mean_pressure=level.mean_pressure,
             covariance=tuple(fit.covariance.ravel().tolist()),
@@ -424,19 +389,6 @@ def fit_rows(own: Sequence[LevelFit], cofs: ByPressure) -> list[FitRow]:
         )
         rows.append(row)
     return rows
-
-
-def _level_fit(row: FitRow) -> LevelFit:
-    """The inverse of `fit_rows`, exactly."""
-    fit = StribeckFit(
-        **{name: getattr(row, name) for name in _FIT_COLUMNS},
-        parameters=StribeckParameters(**{name: getattr(row, name) for name in PARAMETER_NAMES}),
-        covariance=np.reshape(row.covariance, (4, 4)),
-        unbiased_covariance=np.reshape(row.unbiased_covariance, (4, 4)),
-        status=FitStatus(row.status),
-        acceptable=row.mse_percent is not None and row.mse_percent < ACCEPTABLE_MSE,
-    )
-    return LevelFit(mean_pressure=row.mean_pressure, speeds=row.speeds, fit=fit)
 
 
 def latest_diagnosis(row: ClutchRow, verdict: VerdictRow | None) -> dict[str, Any] | None:

@@ -35,12 +35,12 @@ from storage.runs import RunRow
 _log = logging.getLogger("clutchlife")
 
 
-def evidence(connection: Connection, clutch_id: str) -> Evidence:
-    """What was measured of a clutch, of held runs too; without a reader of its runs."""
+def evidence(connection: Connection, clutch_id: str, *, of_fits: bool = False) -> Evidence:
+    """What was measured of a clutch, of held runs too; without a reader of its runs. `of_fits`: nothing but fits."""
     return Evidence(
         levels=records.levels(connection, clutch_id),
-        receipts=records.receipts(connection, clutch_id),
-        engagements=_engagements(connection, clutch_id),
+        receipts={} if of_fits else records.receipts(connection, clutch_id),
+        engagements={} if of_fits else _engagements(connection, clutch_id),
     )
 
 

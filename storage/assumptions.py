@@ -52,14 +52,14 @@ def insert_adoption(connection: Connection, clutch_id: str, row: AdoptedRow) -> 
     connection.execute(adopted_model.insert(), _adoptions.values(row, clutch_id=clutch_id))
 
 
-def corrected_cofs_of(connection: Connection, clutch_id: str) -> dict[int, dict[float, CorrectedCof]]:
+def corrected_cofs_of(connection: Connection, clutch_id: str, beyond: int = 0) -> dict[int, dict[float, CorrectedCof]]:
     """run_key -> pressure -> mean COF, its deviation, and mean COF under each draw of the model in force, where it corrects
-    them."""
+    them. Of runs with keys `beyond` that one."""
     cofs: dict[int, dict[float, CorrectedCof]] = {}
     query = (
         select(corrected_cof)
         .join(run, run.c.run_key == corrected_cof.c.run_key)
-        .where(run.c.clutch_id == clutch_id)
+        .where(run.c.clutch_id == clutch_id, run.c.run_key > beyond)
         .order_by(corrected_cof.c.run_key, corrected_cof.c.pressure)
     )
     rows = connection.execute(query)

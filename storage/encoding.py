@@ -34,6 +34,7 @@ import math
 import struct
 import zlib
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from operator import itemgetter
 from types import UnionType
 from typing import Any, Generic, TypeAlias, TypeVar, get_args, get_origin, get_type_hints
@@ -83,18 +84,18 @@ def decode(data: bytes | bytearray, codec: str, length: int) -> NDArray[np.float
     return np.ascontiguousarray(shuffled.T).view("<f8").reshape(length).astype(np.float64, copy=False)
 
 
-def pack(arrays: Mapping[str, NDArray[np.float64]]) -> bytes:
-    """Named arrays of any shape as bytes, order kept, flags (0 and 1) as bits.
+def pack(arrays: Mapping[str, NDArray[np.float64] | NDArray[np.bool_]]) -> bytes:
+    """Named arrays of any shape as bytes, order kept, flags (0 and 1, or booleans) as bits.
 
-    Raises ValueError on an array that is not of 64-bit floats.
+    Raises ValueError on an array that is of neither 64-bit floats nor booleans.
     """
     index: list[tuple[object, ...]] = []
     parts: list[bytes] = []
     for name, array in arrays.items():
-        if array.dtype != np.float64:
-            raise ValueError(f"{name} must be of float64, got {array.dtype}")
-        flags = array == 1.0
-        if (flags | ((array == 0.0) & ~np.signbit(array))).all():
+        if array.dtype not in (np.float64, np.bool_):
+            raise ValueError(f"{name} must be of float64 or bool, got {array.dtype}")
+        flags = _flags(array)
+        if flags is not None:
             index.append((name, array.shape, _BITS))
             parts.append(np.packbits(flags).tobytes())
         else:
@@ -106,15 +107,25 @@ def pack(arrays: Mapping[str, NDArray[np.float64]]) -> bytes:
     return bytes(data)
 
 
-def unpack(data: bytes) -> dict[str, NDArray[np.float64]]:
-    """The arrays that `pack` was given. Raises DamagedData where the bytes are not what was stored."""
+def _flags(array: NDArray[np.float64] | NDArray[np.bool_]) -> NDArray[np.bool_] | None:
+    """An array of nothing but 0 and 1 as booleans, None for another."""
+    if array.dtype == np.bool_:
+        return array.astype(np.bool_, copy=False)
+    flags: NDArray[np.bool_] = array == 1.0
+    return flags if (flags | ((array == 0.0) & ~np.signbit(array))).all() else None
+
+
+def unpack(data: bytes, *, booleans: bool = False) -> dict[str, NDArray[np.float64] | NDArray[np.bool_]]:
+    """The arrays that `pack` was given; with `booleans` flags as such, an eighth of the memory. Raises DamagedData where the
+    bytes are not what was stored."""
     body = _unsealed(data, at_least=_NUMBER.size)
     start = _NUMBER.size + _NUMBER.unpack_from(body)[0]
     try:
         index = json.loads(bytes(body[_NUMBER.size : start]))
-        arrays = {}
+        arrays: dict[str, NDArray[np.float64] | NDArray[np.bool_]] = {}
         for name, shape, *form in index:
-            arrays[name], start = _unpacked(body, start, shape, form)
+            array, start = _unpacked(body, start, shape, form)
+            arrays[name] = array if booleans else array.astype(np.float64, copy=False)
     except (ValueError, TypeError) as error:
         raise DamagedData(f"packed arrays do not unpack: {error}") from error
     if start != len(body):
@@ -122,7 +133,9 @@ def unpack(data: bytes) -> dict[str, NDArray[np.float64]]:
     return arrays
 
 
-def _unpacked(body: memoryview, start: int, shape: list[int], form: list[str]) -> tuple[NDArray[np.float64], int]:
+def _unpacked(
+    body: memoryview, start: int, shape: list[int], form: list[str]
+) -> tuple[NDArray[np.float64] | NDArray[np.bool_], int]:
     """The array from `start` on, and where it ends."""
     size = math.prod(shape)
     if not form:
@@ -131,7 +144,7 @@ def _unpacked(body: memoryview, start: int, shape: list[int], form: list[str]) -
     if form != [_BITS] or size < 0:
         raise ValueError(f"{size} values in the form {form}")
     bits = np.frombuffer(body, dtype=np.uint8, count=math.ceil(size / 8), offset=start)
-    return np.unpackbits(bits, count=size).reshape(shape).astype(np.float64), start + bits.nbytes
+    return np.unpackbits(bits, count=size).reshape(shape).view(np.bool_), start + bits.nbytes
 
 
 def _append_planes(data: bytearray, planes: NDArray[np.uint8]) -> list[int]:
@@ -286,7 +299,7 @@ _CODINGS: dict[Any, _Coding] = {
     dict: (to_text, to_object),
     tuple: _of_list,
     Sequence: _of_list,
-    Mapping: (pack, unpack),
+    Mapping: (pack, partial(unpack, booleans=True)),
     bool: (int, bool),
 }
 

@@ -61,10 +61,12 @@ def write_fits(connection: Connection, run_key: int, rows: Sequence[FitRow]) -> 
         connection.execute(fit.insert(), [_fit_values(run_key, row) for row in rows])
 
 
-def fits_of(connection: Connection, clutch_id: str) -> dict[int, list[FitRow]]:
-    """The fits of a clutch's runs by run_key, runs in order, pressures ascending; runs without fits are left out."""
+def fits_of(connection: Connection, clutch_id: str, beyond: int = 0) -> dict[int, list[FitRow]]:
+    """The fits of a clutch's runs with keys `beyond` that one by run_key, runs in order, pressures ascending; runs without
+    fits are left out."""
     fits: dict[int, list[FitRow]] = {}
-    query = select(fit).join(run, run.c.run_key == fit.c.run_key).where(run.c.clutch_id == clutch_id)
+    query = select(fit).join(run, run.c.run_key == fit.c.run_key)
+    query = query.where(run.c.clutch_id == clutch_id, run.c.run_key > beyond)
     rows = connection.execute(query.order_by(run.c.cycles, run.c.run_id, fit.c.pressure))
     of = _fits.reader(rows)
     for row in rows:
@@ -72,13 +74,19 @@ def fits_of(connection: Connection, clutch_id: str) -> dict[int, list[FitRow]]:
     return fits
 
 
-def cofs_of(connection: Connection, clutch_id: str) -> dict[int, dict[float, tuple[float, float]]]:
-    """run_key -> pressure -> mean COF and its deviation, of all curves that determine it: as much as tracking needs."""
+def fits_of_run(connection: Connection, run_key: int) -> list[FitRow]:
+    """The fits of one run, pressures ascending."""
+    return _fits.all(connection.execute(select(fit).where(fit.c.run_key == run_key).order_by(fit.c.pressure)))
+
+
+def cofs_of(connection: Connection, clutch_id: str, beyond: int = 0) -> dict[int, dict[float, tuple[float, float]]]:
+    """run_key -> pressure -> mean COF and its deviation, of all curves that determine it: as much as tracking needs. Of runs
+    with keys `beyond` that one."""
     cofs: dict[int, dict[float, tuple[float, float]]] = {}
     query = (
         select(fit.c.run_key, fit.c.pressure, fit.c.mean_cof, fit.c.mean_cof_sd)
         .join(run, run.c.run_key == fit.c.run_key)
-        .where(run.c.clutch_id == clutch_id, fit.c.mean_cof.is_not(None))
+        .where(run.c.clutch_id == clutch_id, run.c.run_key > beyond, fit.c.mean_cof.is_not(None))
         .order_by(fit.c.run_key, fit.c.pressure)
     )
     for run_key, pressure, mean, deviation in connection.execute(query):
@@ -150,7 +158,7 @@ class FilterStateRow:
     method: str
     pressure: float
     runs: int
-    arrays: Mapping[str, NDArray[np.float64]]
+    arrays: Mapping[str, NDArray[np.float64] | NDArray[np.bool_]]
     code_version: str
 
 

@@ -57,7 +57,8 @@ class ReceiptRow:
 class RunInOrder:
     """As much of a run as tracking and doubts need; a stationary test has the range of its speeds and the mean temperature
     of its oil [K], maintenance its event, a block of duty its load (in the units in which it was sent). `doubted`: there are
-    or were doubts; `shown` is what it shows of friction, as JSON text."""
+    or were doubts; `shown` is what it shows of friction, as JSON text; `follows` the clutch's revision to which the run was
+    appended, None where it changed more."""
 
     run_key: int
     run_id: str
@@ -76,6 +77,8 @@ class RunInOrder:
     duty_energy_kj: float | None = None
     duty_speed_rpm: float | None = None
     duty_duration_s: float | None = None
+    state: str = ACCEPTED
+    follows: int | None = None
 
 
 _stored, _listed = Rows(RunRow, key="run_key", of=run), Rows(ReceiptRow)
@@ -94,6 +97,8 @@ _light = select(
     json_value(run.c.details, "duty", "energy_per_cycle_kj"),
     json_value(run.c.details, "duty", "initial_speed_rpm"),
     json_value(run.c.details, "duty", "engagement_duration_s"),
+    run.c.state,
+    json_value(run.c.details, "follows"),
 ).order_by(*_ORDER)
 _held = select(run.c.clutch_id, func.count()).where(HELD_ONLY).group_by(run.c.clutch_id)
 
@@ -167,6 +172,30 @@ def in_order(connection: Connection, clutch_id: str) -> list[RunInOrder]:
     return _in_order(connection, clutch_id, run.c.state == ACCEPTED)
 
 
+def newest_fitted(connection: Connection, clutch_id: str, kind: str) -> int | None:
+    """The key of the last accepted run of a kind, in order, that has fits; None without any."""
+    query = _chosen(select(run.c.run_key), clutch_id, None, kind, ACCEPTED).order_by(None)
+    query = query.where(exists().where(fit.c.run_key == run.c.run_key))
+    key: int | None = connection.execute(query.order_by(*(column.desc() for column in _ORDER)).limit(1)).scalar()
+    return key
+
+
+def in_history(connection: Connection, clutch_id: str) -> list[RunInOrder]:
+    """The accepted and held runs of a clutch in order."""
+    return _in_order(connection, clutch_id, run.c.state != WITHDRAWN)
+
+
+def after_key(connection: Connection, clutch_id: str, run_key: int) -> list[RunInOrder]:
+    """The runs of a clutch that arrived after the one with that key, in order, whatever their state."""
+    return _in_order(connection, clutch_id, run.c.run_key > run_key)
+
+
+def last_key(connection: Connection, clutch_id: str) -> int:
+    """The greatest key of a clutch's runs, 0 without any."""
+    newest = select(func.coalesce(func.max(run.c.run_key), 0)).where(run.c.clutch_id == clutch_id)
+    return int(connection.execute(newest).scalar_one())
+
+
 def rebuilds(connection: Connection, clutch_id: str) -> list[RunInOrder]:
     rebuild = json_text(run.c.details, "event") == "rebuild"
     return _in_order(connection, clutch_id, and_(run.c.state == ACCEPTED, rebuild))
@@ -175,10 +204,6 @@ def rebuilds(connection: Connection, clutch_id: str) -> list[RunInOrder]:
 def set_aside(connection: Connection, clutch_id: str) -> list[RunInOrder]:
     """The runs of a clutch that are held or were withdrawn, in order."""
     return _in_order(connection, clutch_id, run.c.state != ACCEPTED)
-
-
-def held_of(connection: Connection, clutch_id: str) -> list[RunInOrder]:
-    return _in_order(connection, clutch_id, HELD_ONLY)
 
 
 def _in_order(connection: Connection, clutch_id: str, chosen: ColumnElement[bool] | TextClause) -> list[RunInOrder]:

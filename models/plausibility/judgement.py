@@ -151,7 +151,7 @@ class _Clutch:
     @cached_property
     def cycles(self) -> FloatArray:
         """As sent [n]."""
-        return np.array([run.sent.cycles for run in self.runs])
+        return np.array([run.cycles for run in self.runs])
 
     @cached_property
     def centres(self) -> FloatArray:
@@ -180,6 +180,12 @@ class _Clutch:
         left_out = [i for i, run in enumerate(self.runs) if run.tests and i not in set(self.tests)]
         reach = self._apart(left_out).min(initial=math.inf)
         return frozenset(np.flatnonzero(self._apart(range(len(self.runs))) < reach).tolist())
+
+    @cached_property
+    def never_doubted(self) -> frozenset[int]:
+        """Tests too far away to be looked at: they are as sent in every belief, and add the same to each."""
+        looked_at = self.compared.union(self.tests, self.about)
+        return frozenset(i for i, run in enumerate(self.runs) if run.tests and i not in looked_at)
 
     def _nearest(self, indices: Sequence[int], most: int) -> list[int]:
         if len(indices) <= most:
@@ -244,7 +250,7 @@ class _Weighed:
     @cached_property
     def origins(self) -> list[float]:
         """The cycles at which lives begin."""
-        return [0.0, *(self.clutch.runs[i].sent.cycles for i in self.kept if self.clutch.runs[i].rebuild)]
+        return [0.0, *(self.clutch.runs[i].cycles for i in self.kept if self.clutch.runs[i].rebuild)]
 
     @cached_property
     def life_of(self) -> dict[int, int]:
@@ -301,7 +307,7 @@ class _Weighed:
     def _shifts(self, life: int) -> FloatArray:
         """The cycles of the events of a life that may have shifted its level."""
         runs = self.clutch.runs
-        return np.array([runs[i].sent.cycles for i in self.kept if runs[i].shift and self.life_of[i] == life])
+        return np.array([runs[i].cycles for i in self.kept if runs[i].shift and self.life_of[i] == life])
 
     @cached_property
     def log_probability(self) -> float:
@@ -309,6 +315,8 @@ class _Weighed:
         total = self.base
         for i in self.kept:
             run = self.clutch.runs[i]
+            if i in self.clutch.never_doubted:
+                continue
             total += run.sent.log_protocol
             if run.sent.log_cof is not None:
                 total += float(log_physics(np.array(run.sent.log_cof))) if run.tests else self.log_cof(i, [run.sent])[0]
@@ -541,7 +549,7 @@ class _Weighed:
         if run.moment is None:
             return False
         for other in (self.clutch.runs[i] for i in self.kept if i != index):
-            further = other.sent.cycles - (other.block or 0.0) - (run.sent.cycles - (run.block or 0.0))
+            further = other.cycles - (other.block or 0.0) - (run.cycles - (run.block or 0.0))
             later = 0.0 if other.moment is None else other.moment - run.moment
             if (further < -0.5 and later > 1.0) or (further > 0.5 and later < -1.0):
                 return True

@@ -4,6 +4,8 @@ and how often it is made."""
 import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple
 
 from models.plausibility import criteria
 from models.plausibility.pace import log_anywhere
@@ -41,18 +43,11 @@ class Slip:
     unit: str = ""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Run:
-    """A run: `sent` as it came in, and the `slips` of its channels that are possible, made when they are asked for.
-
-    `tests` says whether its COF is evidence of the course (a stationary test); `block` [cycles] what a block of duty says it
-    ran; `moment` [s] when it was started, None where it does not say; `shift` an event that may move the level of COF,
-    `rebuild` one that begins a life; `fixed` a run that somebody confirmed: it is not held, and seldom slipped all the same.
-    """
-
+class _Run(NamedTuple):
     name: str
     kind: str
-    sent: Reading
+    cycles: float
+    reading: Callable[[], Reading]
     slips: Callable[[], Iterable[Slip]] = tuple
     tests: bool = False
     block: float | None = None
@@ -60,6 +55,21 @@ class Run:
     shift: bool = False
     rebuild: bool = False
     fixed: bool = False
+
+
+class Run(_Run):
+    """A run at the `cycles` as sent: its `reading` as it came in, and the `slips` of its channels that are possible, both
+    made when they are asked for, since of a long history few runs are looked at.
+
+    `tests` says whether its COF is evidence of the course (a stationary test); `block` [cycles] what a block of duty says it
+    ran; `moment` [s] when it was started, None where it does not say; `shift` an event that may move the level of COF,
+    `rebuild` one that begins a life; `fixed` a run that somebody confirmed: it is not held, and seldom slipped all the same.
+    """
+
+    @cached_property
+    def sent(self) -> Reading:
+        """The run as it came in."""
+        return self.reading()
 
 
 def slips_of(run: Run, expected: float) -> Iterator[Slip]:

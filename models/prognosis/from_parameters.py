@@ -30,6 +30,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
@@ -37,6 +38,8 @@ from models.friction.stribeck import StribeckParameters, slope, torque
 from models.prognosis.criteria import BAND, FAR_APART, FEWEST_TESTS, HORIZON
 from models.prognosis.first_passage import first_below, places, weighted_quantiles
 from models.tracking.courses import Course, basis
+from models.tracking.criteria import UNMERGED
+from models.tracking.merged_tests import bins_of
 from models.tracking.posterior import Posterior
 from models.tracking.sampling import systematic, tempered
 
@@ -58,14 +61,18 @@ def draw_jointly(
     between tests. `own` are the quantities' own samples: of these only φ and ε are used.
     """
     quantities = values.shape[1]
+    typical = np.maximum(np.abs(values).max(axis=0), 1e-300)
+    scaled, spread = values / typical, covariance / np.outer(typical, typical)
+    precision = np.asarray(np.linalg.inv(spread), dtype=np.float64)
+    if progress.size > UNMERGED:
+        progress, scaled, precision = _merged(progress, scaled, precision)
+        spread = np.asarray(np.linalg.inv(precision), dtype=np.float64)
     index = np.stack([systematic(track.weight, _TRIED, float(rng.random())) for track in own], axis=1)
     index = np.take_along_axis(index, np.argsort(rng.random(index.shape), axis=0), axis=0)
     scale = np.stack([np.log(track.scale[i]) for track, i in zip(own, index.T, strict=True)])
     exponent = np.stack([np.log(track.exponent[i]) for track, i in zip(own, index.T, strict=True)])
     b = basis(progress[:, None, None], scale, exponent, np.array(Course.EQ_6))  # [t, q, n]
-    typical = np.maximum(np.abs(values).max(axis=0), 1e-300)
-    scaled, spread = values / typical, covariance / np.outer(typical, typical)
-    mean, root, evidence = _solved(b, scaled, np.asarray(np.linalg.inv(spread), dtype=np.float64))
+    mean, root, evidence = _solved(b, scaled, precision)
     for column in range(quantities):
         alone = 1.0 / spread[:, column, column]
         evidence -= _solved(b[:, [column]], scaled[:, [column]], alone[:, None, None])[2]
@@ -85,6 +92,19 @@ def draw_jointly(
         )
         for column in range(quantities)
     ]
+
+
+def _merged(
+    progress: FloatArray, values: FloatArray, precision: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Progress [t], values [t, q] and precisions [t, q, q] with tests of one bin as one: the bins of `merged_tests`."""
+    order = np.argsort(progress, kind="stable")
+    first = np.unique(bins_of(progress[order]), return_index=True)[1]
+    count = np.diff(np.append(first, progress.size))
+    total = np.add.reduceat(precision[order], first, axis=0)
+    pulled = np.add.reduceat(np.einsum("tjk,tk->tj", precision[order], values[order]), first, axis=0)
+    level = np.linalg.solve(total, pulled[:, :, None])[:, :, 0]
+    return np.add.reduceat(progress[order], first) / count, level, total
 
 
 def _solved(b: FloatArray, values: FloatArray, weight: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -272,6 +292,9 @@ def parameter_draws(level: PressureLevel, rng: np.random.Generator) -> list[Post
 
 def _averaged(covariance: FloatArray) -> FloatArray:
     """Covariances [t, q, q], each the mean of those of its own and the neighbouring tests."""
+    if len(covariance) > UNMERGED:
+        beyond = [covariance[:_BESIDE][::-1], covariance, covariance[-_BESIDE:][::-1]]
+        return np.asarray(sliding_window_view(np.concatenate(beyond), 2 * _BESIDE + 1, axis=0).mean(axis=-1))
     places = range(len(covariance))
     return np.stack([covariance[max(0, place - _BESIDE) : place + _BESIDE + 1].mean(axis=0) for place in places])
 

@@ -69,3 +69,14 @@ MOST = 6
 DOMAIN = 6.0
 #: An innovation counts at most as one of this many deviations in an unscented filter. Chosen; no table.
 OUTLIER = 5.0
+
+# Older tests of a long history (`merged_tests`)
+
+#: Tests up to which none are merged, and how many of the newest never are. Chosen: docs/appendix/scale.md (one life).
+UNMERGED, NEWEST = 100, 6
+#: Bins across the measured progress, and bins for each e-fold of progress from the usual distance of tests on.
+LINEAR, LOGARITHMIC = 12.0, 3.5
+#: A test is not merged where the log odds that it is outlying are less than this either way, and of those so many at most.
+DOUBTFUL, MAX_APART = 2.0, 12
+#: A bin whose tests scatter more than is usual by so many deviations is split in halves, the worst first, so often at most.
+SPLIT_FROM, MAX_SPLIT = 4.0, 12

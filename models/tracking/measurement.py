@@ -20,6 +20,9 @@ class Measurement:
     new_levels: int = 0
 
     def __post_init__(self) -> None:
+        total = self.progress + self.value + self.variance + self.epoch + self.new_levels
+        if math.isfinite(total) and min(self.progress, self.variance, self.epoch, self.new_levels) >= 0:
+            return
         for name in ("progress", "value", "variance", "epoch", "new_levels"):
             number = getattr(self, name)
             if not math.isfinite(number):

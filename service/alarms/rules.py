@@ -142,12 +142,10 @@ def _health(_rule: AlarmIn, facts: Facts) -> Finding | None:
 def _shudder_margin(rule: AlarmIn, facts: Facts) -> Finding | None:
     """The least slope dμ/dv over the pressures of the newest stationary test (by cycles), if it counts and has curves, at
     the quantile of its standard error."""
-    by_run = results.fits_of(facts.connection, facts.clutch_id)
-    rows = runs.in_order(facts.connection, facts.clutch_id)
-    tests = [by_run[row.run_key] for row in rows if row.kind == STATIONARY and row.run_key in by_run]
+    newest = runs.newest_fitted(facts.connection, facts.clutch_id, STATIONARY)
     margins = [
         (margin, fit.pressure)
-        for fit in (tests[-1] if tests else [])
+        for fit in ([] if newest is None else results.fits_of_run(facts.connection, newest))
         if (margin := slope_quantile(rule, fit, facts.geometry)) is not None
     ]
     if not margins:

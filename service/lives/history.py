@@ -11,6 +11,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import astuple, dataclass, field, fields, replace
 from datetime import UTC, datetime
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -91,6 +92,26 @@ class Event:
     confirmed: bool = False
     new_level: bool = False
     under: Mapping[float, tuple[float, ...]] = field(default_factory=dict)
+    _pooled: list[Any] = field(default_factory=list, init=False, repr=False, compare=False)
+    _measured: list[Any] = field(default_factory=list, init=False, repr=False, compare=False)
+
+    def measured(self, progress: float, value: float, sd: float, epoch: int, new_levels: int) -> Measurement:
+        """A measurement of mean COF over the pressures with these numbers, kept for the last ones."""
+        numbers = (progress, value, sd, epoch, new_levels)
+        if not self._measured or self._measured[0] != numbers:
+            measurement = Measurement(
+                progress=progress, value=value, variance=sd**2, epoch=epoch, new_levels=new_levels
+            )
+            self._measured[:] = [numbers, measurement]
+        made: Measurement = self._measured[1]
+        return made
+
+    def pooled(self, reference: ByPressure) -> Value | None:
+        """`pooled_value` of its mean COFs, kept for the last reference."""
+        if not self._pooled or self._pooled[0] is not reference:
+            self._pooled[:] = [reference, pooled_value(reference, self.cofs)]
+        value: Value | None = self._pooled[1]
+        return value
 
     def corrected(self, cofs: Corrected | None) -> "Event":
         """The event with the mean COF that the model in force corrects; unchanged if that corrects nothing."""
@@ -152,9 +173,9 @@ class Series:
         return cycles, (measurement.value + added, measurement.variance**0.5)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class Life:
-    """One life of a clutch: its events by cycles, and the cycles at which it began."""
+    """One life of a clutch: its events by cycles, and the cycles at which it began. What follows from them is found once."""
 
     origin: float
     events: tuple[Event, ...]
@@ -164,27 +185,27 @@ class Life:
         """The run_id of the rebuild that began it, "" where there was none."""
         return self.events[0].run_id if self.events[0].rebuild else ""
 
-    @property
+    @cached_property
     def end(self) -> Event | None:
         """The event by which it was declared ended; None while it goes on."""
         return next((event for event in self.events if event.end is not None), None)
 
-    @property
+    @cached_property
     def speed_range(self) -> Value | None:
         """The speed range of the first stationary test, over which mean COFs are taken."""
         return next((event.speed_range for event in self.events if event.speed_range is not None), None)
 
-    @property
+    @cached_property
     def reference(self) -> ByPressure:
         """Mean COF by pressure of the first stationary test that has one."""
         return next((event.cofs for event in self.events if event.cofs), {})
 
-    @property
+    @cached_property
     def reference_oil(self) -> float | None:
         """Mean oil temperature [K] of that test; None where it was not measured."""
         return next((event.oil_temperature for event in self.events if event.cofs), None)
 
-    @property
+    @cached_property
     def tests(self) -> int:
         """How many of its tests have a mean COF, those among them that cannot be compared with the first."""
         return sum(bool(event.cofs) for event in self.events)
@@ -222,21 +243,34 @@ class Life:
         """ζ over cycles since new, by the duty of this life."""
         return assumptions.scale(self.origin, [event.duty for event in self.events if event.duty is not None])
 
+    @cached_property
+    def _pooled(self) -> list[Series]:
+        """Where `pooled` keeps what it has found last."""
+        return []
+
     def pooled(self, assumptions: Assumptions) -> Series:
         """Mean COF over the pressures of the reference test."""
-        return self._mean_cofs(assumptions, ALL_PRESSURES, pooled_value)
+        if not self._pooled or self._pooled[0].assumptions is not assumptions:
+            self._pooled[:] = [self._mean_cofs(assumptions, ALL_PRESSURES, pooled_value, Event.pooled)]
+        return self._pooled[0]
 
     def at(self, assumptions: Assumptions, level: float) -> Series:
         """Mean COF at one pressure level of the reference test."""
-        return self._mean_cofs(assumptions, level, lambda _, cofs: nearest(level, cofs))
+        return self._mean_cofs(
+            assumptions, level, lambda _, cofs: nearest(level, cofs), lambda event, _: nearest(level, event.cofs)
+        )
 
     def _mean_cofs(
-        self, assumptions: Assumptions, level: float, value: Callable[[ByPressure, ByPressure], Value | None]
+        self,
+        assumptions: Assumptions,
+        level: float,
+        value: Callable[[ByPressure, ByPressure], Value | None],
+        value_of: Callable[[Event, ByPressure], Value | None],
     ) -> Series:
         """Mean COF by its value of the reference test's and a test's mean COFs, under each draw of the model in force."""
         first = next((event for event in self.events if event.cofs), None)
         reference = {} if first is None else first.cofs
-        values = [value(reference, event.cofs) for event in self.events]
+        values = [value_of(event, reference) for event in self.events]
         series = self.series(assumptions, MEAN_COF, level, values)
         weights, course = assumptions.model.weights, assumptions.model.course
         if first is None or len(weights) == 1 or (course is None and not any(event.under for event in self.events)):
@@ -279,7 +313,9 @@ class Life:
             quantity=quantity,
             pressure=pressure,
             measurements=tuple(
-                Measurement(
+                self.events[index].measured(at, value - off, sd, epochs[index], levels[index])
+                if pressure == ALL_PRESSURES
+                else Measurement(
                     progress=at, value=value - off, variance=sd**2, epoch=epochs[index], new_levels=levels[index]
                 )
                 for (index, (value, sd)), at, off in places
@@ -302,6 +338,13 @@ def order(events: Sequence[Event]) -> tuple[Event, ...]:
     return tuple(
         sorted(events, key=lambda event: (event.cycles, *places.get(event.run_id, (event.moment, 0)), event.run_id))
     )
+
+
+def with_event(events: tuple[Event, ...], event: Event) -> tuple[Event, ...]:
+    """An ordered history with one more event, ordered."""
+    if not events or event.cycles > events[-1].cycles:  # behind all others, whatever is known of dates
+        return (*events, event)
+    return order([*events, event])
 
 
 def lives_of(events: Sequence[Event]) -> list[Life]:
@@ -380,8 +423,8 @@ def reference_velocities(speed_range: Value, geometry: Geometry) -> FloatArray:
 
 def nearest(level: float, values: ByPressure) -> Value | None:
     """The value at the pressure that is the same level as `level`, if there is one."""
-    if not values:
-        return None
+    if level in values or not values:
+        return values.get(level)
     near = min(values, key=lambda pressure: abs(pressure - level))
     return values[near] if abs(near - level) <= max(LEVEL_GAP, LEVEL_GAP_SHARE * level) else None
 

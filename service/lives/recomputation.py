@@ -8,8 +8,8 @@ the filters may go one step on from their stored states, and where a life is tra
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from functools import partial
+from dataclasses import dataclass, field, fields, replace
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 from models.clutch import Geometry
@@ -53,9 +53,9 @@ def newest_adoption(adoptions: Iterable[Adoption | None], lives: Collection[str]
     )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class ClutchState:
-    """What the next run's results depend on, at one revision.
+    """What the next run's results depend on, at one revision. What follows from it is found once.
 
     `events` are all accepted runs in the order of the history, mean COF as the model in force corrects it; `held` those that
     are held, with the mean COFs that they would have in it; `adoptions` what was adopted, newest first (None: the baseline);
@@ -76,7 +76,7 @@ class ClutchState:
     def clutch_id(self) -> str:
         return self.record.clutch_id
 
-    @property
+    @cached_property
     def geometry(self) -> Geometry:
         return self.record.geometry.to_model()
 
@@ -85,17 +85,17 @@ class ClutchState:
         """The share of the initial mean COF that ends a life."""
         return self.record.end_of_life.cof_fraction
 
-    @property
-    def lives(self) -> list[history.Life]:
+    @cached_property
+    def lives(self) -> tuple[history.Life, ...]:
         """The history cut at its rebuilds."""
-        return history.lives_of(self.events)
+        return tuple(history.lives_of(self.events))
 
-    @property
+    @cached_property
     def adoption(self) -> Adoption | None:
         """What was adopted last of the lives that are in the history."""
         return newest_adoption(self.adoptions, [life.name for life in self.lives])
 
-    @property
+    @cached_property
     def extension(self) -> Extension | None:
         """The extension that the present life is tracked under, None under the baseline: a rebuild ends an adoption."""
         name, adoption = self.lives[-1].name if self.events else "", self.adoption
@@ -106,7 +106,15 @@ class ClutchState:
         return kind_of(self.record, self.assumptions().severity)
 
     def assumptions(self) -> Assumptions:
+        return self._assumptions
+
+    @cached_property
+    def _assumptions(self) -> Assumptions:
         return self.assumptions_under(self.extension, self.lives[-1] if self.events else None)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What follows from the state is not sent to another process."""
+        return {field.name: getattr(self, field.name) for field in fields(self)}
 
     def assumptions_under(self, extension: Extension | None, life: history.Life | None) -> Assumptions:
         """What a life would be tracked under, were this extension in force."""
@@ -195,7 +203,7 @@ def with_cofs(
 def cofs_among(state: ClutchState, event: history.Event, levels: Sequence[LevelFit]) -> history.ByPressure:
     """A run's mean COFs as they are, or would be, in the history: over the protocol of its life's first stationary test,
     which may be itself."""
-    life = history.life_with(history.order([*state.events, event]), event)
+    life = history.life_with(history.with_event(state.events, event), event)
     return _cofs_of_tests([life], {event.run_id: levels}, state.geometry).get(event.run_id, {})
 
 
@@ -276,11 +284,15 @@ def _carried(state: ClutchState, life: history.Life, whole: history.Series, newe
     """The stored states from before `newest`, or None where one step on from them would not give the same answer."""
     last = life.events[-1]
     is_test = newest.speed_range is not None
-    if newest.rebuild or newest not in life.events or (newest is not last and (is_test or newest.cycles < last.cycles)):
+    index = (
+        len(life.events) - 1
+        if newest is last
+        else next((place for place, event in enumerate(life.events) if event is newest), -1)
+    )
+    if newest.rebuild or index < 0 or (newest is not last and (is_test or newest.cycles < last.cycles)):
         return None
     if (newest is not last and newest.shift) or state.filters is None:
         return None
-    index = life.events.index(newest)
     before = sum(1 for event in whole.events if event != index)
     if state.filters.keys() != (set(CARRIED) if before else set()):
         return None

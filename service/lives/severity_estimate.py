@@ -76,6 +76,6 @@ def severity_estimate(life: Life, assumptions: Assumptions) -> SeverityEstimate 
         if len({measurement.progress for measurement in series.measurements}) <= FEWEST_TESTS:
             return None
         prior = under.priors(series.quantity, series.measurements[0], series.scale)[WEAK]
-        log_evidence.append(_GRID.laid(_GRID.from_history(prior, series.measurements)).log_evidence)
+        log_evidence.append(_GRID.laid(_GRID.from_merged(prior, series.measurements)).log_evidence)
     share = np.exp(np.array(log_evidence) - max(log_evidence))
     return SeverityEstimate(basis=basis, probability=share / share.sum())

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from models.arrays import FloatArray
 from models.prognosis.back_cast import BackCast, kept_after
@@ -44,6 +45,8 @@ CARRIED = tuple(method for method in METHODS if method != _GRID.name)
 _STATES: Mapping[str, type[FilterState]] = {"particle": ParticleState, "ukf": UkfState}
 #: What the arrays of a back-cast are named after, among the names of priors.
 _BACK_CAST = "back_cast"
+#: What of a state are flags; numbers that happen to be 0 and 1 are stored like them.
+_FLAGS = "outlying"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,7 +69,7 @@ class Tracked:
     back_cast: BackCast
     sample: Posterior | None = None
 
-    def to_arrays(self) -> dict[str, FloatArray]:
+    def to_arrays(self) -> dict[str, FloatArray | NDArray[np.bool_]]:
         """Named arrays: those of a state after the prior that it started from, as in `weak/mean`."""
         named = {
             f"{prior}/{name}": array
@@ -77,11 +80,12 @@ class Tracked:
         return named | {f"{_BACK_CAST}/{name}": array for name, array in back_cast.items()}
 
     @classmethod
-    def from_arrays(cls, method: str, runs: int, arrays: Mapping[str, FloatArray]) -> "Tracked":
-        parts: dict[str, dict[str, FloatArray]] = {}
+    def from_arrays(cls, method: str, runs: int, arrays: Mapping[str, FloatArray | NDArray[np.bool_]]) -> "Tracked":
+        parts: dict[str, dict[str, Any]] = {}
         for name, array in arrays.items():
             owner, _, part = name.partition("/")
-            parts.setdefault(owner, {})[part] = array
+            is_number = array.dtype == np.float64 or part == _FLAGS
+            parts.setdefault(owner, {})[part] = array if is_number else array.astype(np.float64)
         back_cast = BackCast(**parts.pop(_BACK_CAST))
         states = {prior: _STATES[method].from_arrays(arrays_of_prior) for prior, arrays_of_prior in parts.items()}
         return cls(runs=runs, states=states, back_cast=back_cast)
@@ -177,11 +181,9 @@ def _continues(tracked: Tracked, branches: Mapping[str, tuple[Prior, tuple[Measu
         if state.prior != prior or tracked.runs > len(branch_state):
             return False
         measurements, history = branch_state[: tracked.runs], state.history
-        rows = zip(
-            measurements, history.progress.tolist(), history.value.tolist(), history.epoch.tolist(), strict=False
-        )
-        if any((m.progress, m.value, m.epoch) != (zeta, value, epoch) for m, zeta, value, epoch in rows):
-            return False
+        for name in ("progress", "value", "epoch"):
+            if [getattr(m, name) for m in measurements] != getattr(history, name)[: len(measurements)].tolist():
+                return False
     return True
 
 

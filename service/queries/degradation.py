@@ -69,7 +69,7 @@ def degradation(
     with database.reading() as connection:
         state = records.state(connection, clutch_id)
         chosen = chosen_life(state, life, at_cycles)
-        evidence = stored_runs.evidence(connection, clutch_id)
+        evidence = stored_runs.evidence(connection, clutch_id, of_fits=_follows_from_fits(asked_quantity))
     measured = measured_life(state, chosen, evidence)
     held_fields = held_runs_left_out(len(chosen.held))
     head = {"clutch_id": clutch_id, "revision": state.revision, "method": method, "life": chosen.item()}
@@ -91,6 +91,11 @@ def degradation(
         "warnings": [*notice_items([*_disagreements(from_parameters), *doubted]), *held_fields["warnings"]],
     }
     return head | answered | chosen.assumptions.named() | {"next": None}
+
+
+def _follows_from_fits(quantity: Quantity | None) -> bool:
+    """Whether the tracks of a quantity, or of mean COF and every parameter, follow from fitted curves alone."""
+    return quantity is None or quantity.family not in (Family.LAG, Family.ENGAGEMENT)
 
 
 def arguments(

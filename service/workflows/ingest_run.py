@@ -16,6 +16,7 @@ from models.clutch import Geometry
 from models.loops.loops import Loop
 from service import records, stored_runs
 from service.errors import ArchivedError, BusyError, ConflictError, Notice, TooLargeError
+from service.kept_history import FOLLOWS
 from service.lives import history
 from service.lives.engagements import stored_engagement
 from service.lives.incoming_run import IncomingRun
@@ -52,13 +53,14 @@ MAX_FILE_BYTES = 900_000_000
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Outcome:
     """What a run changes in a clutch at a revision: its receipt and mean COFs, doubts about it, and the results of what was
-    there before."""
+    there before; `appended`: nothing of the history that was there has changed."""
 
     revision: int
     receipt: dict[str, Any]
     cofs: history.ByPressure
     results: Results
     doubts: tuple[Notice, ...] = ()
+    appended: bool = False
 
     @property
     def state(self) -> str:
@@ -179,7 +181,7 @@ def _computed(database: Database, before: ClutchState, arrival: Arrival, read_wi
         raise BusyError("the clutch's geometry or filter was edited while the run was read: send the run again")
     event = _event_of(arrival)
     event = replace(event, cofs=cofs_among(before, event, arrival.analysis.fits))
-    state = replace(before, events=history.order([*before.events, event]))
+    state = replace(before, events=history.with_event(before.events, event))
     history.require_within_ends(state.events)
     levels = _levels(database, state, event, arrival)
     answer, evaluated = _receipt(before, state, event, arrival, levels)
@@ -192,14 +194,22 @@ def _computed(database: Database, before: ClutchState, arrival: Arrival, read_wi
         with_held = replace(before, held=(*before.held, event))
         part = held_summary(with_held, before.filters or {}, _evidence(database, with_held, arrival, answer))
         summary = Results(summary={**before.summary, **part})
-        return _Outcome(revision=before.revision, receipt=answer, cofs=event.cofs, results=summary, doubts=doubts)
+        return _Outcome(
+            revision=before.revision,
+            receipt=answer,
+            cofs=event.cofs,
+            results=summary,
+            doubts=doubts,
+            appended=True,
+        )
     if judged.changes:  # the run speaks for or against others, which are accepted or held from now on
         state = replace(
             before,
             events=judged.settled(before.events, [] if doubts else [event]),
             held=judged.aside(before.held, [event] if doubts else []),
         )
-    if judged.changes or _changes_the_past(before, state.events, event):
+    appended = not (judged.changes or _changes_the_past(before, state.events, event))
+    if not appended:
         with database.reading() as connection:
             receipts = records.receipts(connection, before.clutch_id) | {event.run_id: answer}
             levels = records.levels(connection, before.clutch_id) | _own_levels(arrival)
@@ -224,6 +234,7 @@ def _computed(database: Database, before: ClutchState, arrival: Arrival, read_wi
             teaches=state.kind if not doubts and history.life_with(state.events, event).end is not None else None,
         ),
         doubts=doubts,
+        appended=appended,
     )
 
 
@@ -321,7 +332,7 @@ def _store(
         started_at=run.started_at,
         received_at=arrival.received_at,
         content_sha256=run.content_sha256,
-        details=arrival.kept,
+        details=arrival.kept | ({FOLLOWS: outcome.revision} if outcome.appended else {}),
         receipt=outcome.receipt,
         code_version=CODE_VERSION,
         state=outcome.state,

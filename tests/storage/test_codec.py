@@ -71,7 +71,7 @@ def test_smooth_columns_shrink_noise_hardly_grows_and_flags_take_a_bit_each() ->
 def test_only_a_row_of_64_bit_floats_is_taken(column: NDArray[np.float64]) -> None:
     with pytest.raises(ValueError, match="one row of float64"):
         encode(column)
-    with pytest.raises(ValueError, match="weights must be of float64, got float32"):
+    with pytest.raises(ValueError, match="weights must be of float64 or bool, got float32"):
         pack({"weights": np.zeros(3, np.float32)})
 
 

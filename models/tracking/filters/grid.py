@@ -22,6 +22,7 @@ from models.tracking.filters.lattice import Frame, Kinds, completed
 from models.tracking.history import History
 from models.tracking.linear_model import Points, Sums, Terms, evidence, pointwise
 from models.tracking.measurement import Measurement
+from models.tracking.merged_tests import merged
 from models.tracking.posterior import Posterior
 from models.tracking.prior import Prior
 from models.tracking.sampling import spread_points, systematic, thinned, with_linear_terms
@@ -86,6 +87,12 @@ class Grid:
     def from_history(prior: Prior, measurements: Sequence[Measurement]) -> GridState:
         """All measurements at once: the same as `update` with one after another, bit for bit."""
         return GridState(prior=prior, history=History.of(measurements, prior))
+
+    @staticmethod
+    def from_merged(prior: Prior, measurements: Sequence[Measurement]) -> GridState:
+        """All measurements at once, the older ones of a long history merged: nearly the same posterior at a cost that does
+        not grow with their number (`tracking.merged_tests`)."""
+        return GridState(prior=prior, history=merged(History.of(measurements, prior), prior))
 
     def laid(self, state: GridState) -> Laid:
         """The posterior of everything measured."""

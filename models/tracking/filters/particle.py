@@ -14,8 +14,8 @@ Source: N. Chopin, "A sequential particle filter method for static models", Biom
 """
 
 import math
-from dataclasses import dataclass, fields, replace
-from typing import ClassVar
+from dataclasses import dataclass, field, fields, replace
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +25,18 @@ from models.arrays import FloatArray
 from models.tracking.courses import FORM_COURSE, SCALE_SIGN, Course, log_form_weight, log_scale_at, place_of
 from models.tracking.filters.grid import Grid, GridState
 from models.tracking.history import History
-from models.tracking.linear_model import Points, evidence, last_outlying, log_outlying, pointwise
+from models.tracking.linear_model import (
+    WHOLE,
+    Points,
+    Sums,
+    Terms,
+    evidence,
+    last_outlying,
+    log_outlying,
+    pointwise,
+    solve_again,
+    solved_at,
+)
 from models.tracking.measurement import Measurement
 from models.tracking.posterior import Posterior
 from models.tracking.prior import Prior
@@ -34,12 +45,12 @@ from models.tracking.sampling import normalised, spread_normals, spread_points, 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Cloud:
-    """n particles: points [n, 3] of (log |φ|, log |ε|, log s), form [n] (`courses`), outlying [n, t] (0, 1), log_weight [n]
+    """n particles: points [n, 3] of (log |φ|, log |ε|, log s), form [n] (`courses`), outlying [n, t], log_weight [n]
     and log_target [n] (log prior plus evidence)."""
 
     points: FloatArray
     form: FloatArray
-    outlying: FloatArray
+    outlying: NDArray[np.bool_]
     log_weight: FloatArray
     log_target: FloatArray
 
@@ -64,14 +75,16 @@ class Cloud:
         )
 
 
-def entered(prior: Prior, history: History, cloud: Cloud, rng: np.random.Generator) -> Cloud:
+def entered(
+    prior: Prior, history: History, cloud: Cloud, rng: np.random.Generator
+) -> tuple[Cloud, tuple[Sums, Terms] | None]:
     """The particles of all runs of a history but its last, weighted by that one, each with a flag for it drawn from its
-    posterior given the rest of the particle."""
-    as_sound = replace(cloud, outlying=np.column_stack([cloud.outlying, np.zeros(cloud.form.size)]))
+    posterior given the rest of the particle; and of a long history, where it is dear and the same whichever points it is
+    taken at together, the closed form at each."""
+    as_sound = replace(cloud, outlying=np.column_stack([cloud.outlying, np.zeros(cloud.form.size, bool)]))
     points = as_sound.placed()
-    table = points.basis(history.progress)
-    sums, terms = pointwise(history, prior, points, table)
-    turned = last_outlying(history, prior, points, sums, terms, table[-1])
+    sums, terms = pointwise(history, prior, points)
+    turned = last_outlying(history, prior, points, sums, terms, points.basis(history.progress[-1:])[0])
     log_prior = _log_prior(prior, cloud) + _log_alive(history, cloud)
     flag_sound, flag_outlying = log_outlying(prior, np.array([[0.0, 1.0]]))
     sound = evidence(sums, prior) + log_prior + flag_sound
@@ -80,7 +93,13 @@ def entered(prior: Prior, history: History, cloud: Cloud, rng: np.random.Generat
     is_outlying = np.log(rng.random(total.size)) < outlying - total
     as_sound.outlying[:, -1] = is_outlying
     log_weight = cloud.log_weight + total - cloud.log_target
-    return replace(as_sound, log_weight=log_weight, log_target=np.where(is_outlying, outlying, sound))
+    weighed = replace(as_sound, log_weight=log_weight, log_target=np.where(is_outlying, outlying, sound))
+    if history.value.size <= WHOLE:
+        return weighed, None
+    flagged = np.flatnonzero(is_outlying)
+    if flagged.size:
+        solve_again(history, prior, weighed.taken(flagged).placed(), flagged, sums, terms)
+    return weighed, (sums, terms)
 
 
 def log_target_of(history: History, prior: Prior, cloud: Cloud) -> FloatArray:
@@ -107,9 +126,9 @@ def _log_alive(history: History, cloud: Cloud) -> FloatArray:
 def merged(old: Cloud, new: Cloud, accepted: NDArray[np.bool_]) -> Cloud:
     """The new particles where they were accepted, the old ones elsewhere."""
     columns = {}
-    for field in fields(Cloud):
-        old_values, offered = getattr(old, field.name), getattr(new, field.name)
-        columns[field.name] = np.where(accepted if old_values.ndim == 1 else accepted[:, None], offered, old_values)
+    for column in fields(Cloud):
+        old_values, offered = getattr(old, column.name), getattr(new, column.name)
+        columns[column.name] = np.where(accepted if old_values.ndim == 1 else accepted[:, None], offered, old_values)
     return Cloud(**columns)
 
 
@@ -118,25 +137,31 @@ _GRID = Grid()
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ParticleState:
-    """Everything measured and the particles that stand for it."""
+    """Everything measured and the particles that stand for it; `solved` is the closed form at them where it was just
+    found, and is not stored."""
 
     prior: Prior
     history: History
     cloud: Cloud
+    solved: tuple[Sums, Terms] | None = field(default=None, compare=False, repr=False)
 
-    def to_arrays(self) -> dict[str, FloatArray]:
+    def to_arrays(self) -> dict[str, FloatArray | NDArray[np.bool_]]:
         """The state as named arrays; `from_arrays` gives it back exactly."""
         cloud = {field.name: getattr(self.cloud, field.name) for field in fields(self.cloud)}
         return {"prior": self.prior.to_array()} | self.history.to_arrays() | cloud
 
     @classmethod
-    def from_arrays(cls, arrays: dict[str, FloatArray]) -> "ParticleState":
+    def from_arrays(cls, arrays: dict[str, Any]) -> "ParticleState":
         """The inverse of `to_arrays`."""
         return cls(
             prior=Prior.from_array(arrays["prior"]),
             history=History.from_arrays(arrays),
-            cloud=Cloud(**{field.name: arrays[field.name] for field in fields(Cloud)}),
+            cloud=Cloud(**{field.name: arrays[field.name] for field in fields(Cloud)} | _flags(arrays)),
         )
+
+
+def _flags(arrays: dict[str, Any]) -> dict[str, NDArray[np.bool_]]:
+    return {"outlying": np.asarray(arrays["outlying"], dtype=bool)}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -162,7 +187,7 @@ class Particle:
         cloud = Cloud(
             points=centre + spread * ndtri(even[:, :3]),
             form=forms.astype(np.float64),
-            outlying=np.zeros((self.particles, 0)),
+            outlying=np.zeros((self.particles, 0), dtype=bool),
             log_weight=np.zeros(self.particles),
             log_target=np.zeros(self.particles),
         )
@@ -173,14 +198,14 @@ class Particle:
     def update(self, state: ParticleState, measurement: Measurement, rng: np.random.Generator) -> ParticleState:
         """The posterior with one more measurement."""
         prior, history = state.prior, state.history.append(measurement, state.prior)
-        cloud = entered(prior, history, state.cloud, rng)
+        cloud, solved = entered(prior, history, state.cloud, rng)
         weight = normalised(cloud.log_weight)
         effective = float(1.0 / np.square(weight).sum())
         if effective < 0.25 * self.particles or weight @ cloud.outlying[:, -1] > 0.5:
-            cloud = self._from_grid(prior, history, rng)
+            cloud, solved = self._from_grid(prior, history, rng), None
         elif effective < 0.5 * self.particles:
-            cloud = self._renewed(prior, history, cloud, rng)
-        return ParticleState(prior=prior, history=history, cloud=cloud)
+            cloud, solved = self._renewed(prior, history, cloud, rng), None
+        return ParticleState(prior=prior, history=history, cloud=cloud, solved=solved)
 
     def _from_grid(self, prior: Prior, history: History, rng: np.random.Generator) -> Cloud:
         """Weighted points of the exact posterior."""
@@ -190,7 +215,7 @@ class Particle:
         cloud = Cloud(
             points=np.column_stack([points.log_scale, points.log_exponent, points.log_scatter]),
             form=points.form.astype(np.float64),
-            outlying=points.outlying.T,
+            outlying=points.outlying.T.astype(bool),
             log_weight=np.log(np.maximum(weight, 1e-300)),
             log_target=np.zeros(self.particles),
         )
@@ -218,8 +243,14 @@ class Particle:
     def posterior(self, state: ParticleState, size: int, rng: np.random.Generator) -> Posterior:
         """`size` draws of equal weight: systematic over the particles, with evenly spread draws of (ξ0, Δ)."""
         cloud, offset = state.cloud, rng.random(3)
-        points = cloud.taken(systematic(normalised(cloud.log_weight), size, float(offset[2]))).placed()
-        solved, weight = pointwise(state.history, state.prior, points), np.full(size, 1.0 / size)
+        index = systematic(normalised(cloud.log_weight), size, float(offset[2]))
+        weight = np.full(size, 1.0 / size)
+        if state.solved is None:
+            points = cloud.taken(index).placed()
+            solved = pointwise(state.history, state.prior, points)
+        else:  # whatever was outlying is in the closed form
+            points = replace(cloud, outlying=cloud.outlying[:, :0]).taken(index).placed()
+            solved = solved_at(state.solved, index)
         normals = spread_normals(size, offset[:2])
         return with_linear_terms(state.history, state.prior, points, solved, weight, normals, rng)
 
@@ -269,7 +300,7 @@ def _proposed(cloud: Cloud, shapes: FloatArray, span: float, rng: np.random.Gene
     form = np.where(chance[1] < turning, (form + FORM_COURSE.size / 2) % FORM_COURSE.size, form)
     outlying, turned = cloud.outlying.copy(), np.flatnonzero(chance[2] < turning)
     run = rng.integers(runs, size=turned.size)
-    outlying[turned, run] = 1.0 - outlying[turned, run]
+    outlying[turned, run] = ~outlying[turned, run]
     return replace(cloud, points=points, form=form, outlying=outlying), stretch
 
 

@@ -8,6 +8,7 @@ import bisect
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import reduce
 
 from models.clutch import Geometry
 from models.plausibility import criteria
@@ -15,7 +16,7 @@ from models.plausibility.judgement import Judgement, Verdict, judge
 from models.plausibility.slips import OF_CYCLES, OTHER_CYCLES, Reading
 from service.columns import PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM, ZERO_CELSIUS
 from service.errors import Notice
-from service.lives.history import Event, Shown, beyond_end, order
+from service.lives.history import Event, Shown, beyond_end, order, with_event
 from service.lives.incoming_run import IncomingRun
 from service.lives.plausibility.reading import DEAD, DEAD_PRESSURE, columns_of, dead_channels, runs_of, shown_by
 from service.lives.run_analysis import Analysis
@@ -167,7 +168,7 @@ def doubts_alone(run: IncomingRun, analysis: Analysis, geometry: Geometry) -> tu
 
 
 def doubts_together(
-    accepted: Sequence[Event],
+    accepted: tuple[Event, ...],
     held: Sequence[Event],
     incoming: Event | None,
     geometry: Geometry,
@@ -183,7 +184,7 @@ def doubts_together(
     """
     new = [] if incoming is None else [incoming]
     doubted = _doubted(accepted, held, new)
-    events = order([*accepted, *doubted, *new])
+    events = reduce(with_event, [*doubted, *new], accepted)
     runs = runs_of(events, geometry, corrected=corrected)
     place = {run.name: index for index, run in enumerate(runs)}
     cycles = [event.cycles for event in events]

@@ -5,7 +5,6 @@ Finds dead channels too (unplugged, railed, frozen). What a run shows of frictio
 """
 
 import math
-from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
@@ -164,6 +163,13 @@ class _Comparison:
             return False
         return abs(event.oil_temperature - self.oil) > OTHER_OIL
 
+    def shows_course(self, event: Event) -> bool:
+        """Whether the COF of a run is one of the course: of a test in the usual oil, and positive."""
+        if not event.cofs or self.in_other_oil(event):
+            return False
+        positive = min(event.cofs.values())[0] > 0.0  # then it is, whatever the pressures are
+        return positive or self._compared(event, event.shown or Shown(), event.cofs) is not None
+
     def reading(self, event: Event, shown: Shown, cofs: Mapping[float, tuple[float, float]] | None) -> Reading:
         """The reading of a run that shows this."""
         log_cof, spread = self._compared(event, shown, cofs) or (None, 0.0)
@@ -180,7 +186,9 @@ class _Comparison:
         if self.oil is not None and shown.oil is not None:
             beyond = max(abs(shown.oil - self.oil) - OTHER_OIL, 0.0)
             spread = math.hypot(spread, OTHER_OIL_SD * beyond)
-        pooled = pooled_value(first.cofs, mean_cof) if mean_cof and first is not None else None
+        pooled = None
+        if mean_cof and first is not None:
+            pooled = event.pooled(first.cofs) if mean_cof is event.cofs else pooled_value(first.cofs, mean_cof)
         if pooled is not None and pooled[0] > 0:
             return math.log(pooled[0]), math.hypot(spread, pooled[1] / pooled[0])
         if mean_cof:
@@ -274,14 +282,14 @@ def runs_of(events: Sequence[Event], geometry: Geometry, *, corrected: bool) -> 
         comparison = _Comparison(life=life, geometry=geometry, corrected=corrected)
         for event in life.events:
             shown = event.shown or Shown()
-            sent = comparison.reading(event, shown, event.cofs)
             runs.append(
                 Run(
                     name=event.run_id,
                     kind=event.kind,
-                    sent=sent,
+                    cycles=event.cycles,
+                    reading=partial(comparison.reading, event, shown, event.cofs),
                     slips=tuple if event.shown is None else partial(comparison.slips, event, shown),
-                    tests=bool(event.cofs) and sent.log_cof is not None and not comparison.in_other_oil(event),
+                    tests=comparison.shows_course(event),
                     block=None if event.duty is None or event.kind == RUN_IN else event.duty.cycles,
                     moment=event.moment if event.dated else None,
                     shift=event.shift,
@@ -327,7 +335,13 @@ class _Usual:
 
     def with_tests(self, values: Iterable[float]) -> "_Usual":
         """This prior knowledge, updated with the values of tests."""
-        return replace(self, tests=Counter(self._place(value) for value in values))
+        places, first, count = np.unique(
+            np.rint(10.0 * np.array(list(values)) / self.same), return_index=True, return_counts=True
+        )
+        in_order = np.argsort(first)
+        return replace(
+            self, tests=dict(zip(places[in_order].astype(int).tolist(), count[in_order].tolist(), strict=True))
+        )
 
     def _place(self, value: float) -> int:
         return round(10.0 * value / self.same)

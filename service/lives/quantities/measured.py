@@ -4,13 +4,14 @@ import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from models.arrays import FloatArray
 from models.clutch import Geometry
-from models.friction.identification import cof_slope
+from models.friction.identification import StribeckFit, cof_slope
 from models.friction.stribeck import PARAMETER_NAMES
 from models.prognosis.back_cast import BackCast
 from models.prognosis.criteria import FEWEST_TESTS
@@ -170,7 +171,7 @@ def posterior_of(series: Series, method: str = _GRID.name) -> Posterior:
     for weight, measurements in series.weighted:
         posteriors = {}
         for name, prior in series.priors(measurements[0]).items():
-            state = _GRID.from_history(prior, measurements)
+            state = _GRID.from_merged(prior, measurements)
             rng = step_rng(f"trajectory-{name}", series, len(measurements))
             posteriors[name] = _GRID.posterior(state, math.ceil(TRAJECTORY_DRAWS / len(series.weighted)), rng)
         parts.append((weight, series.assumptions.pooled(posteriors, measurements[0], series.scale)))
@@ -189,7 +190,7 @@ def parameter_series(
     column = PARAMETER_NAMES.index(name)
     values = [
         {
-            fit.pressure: (float(fit.parameters.as_array()[column]), float(fit.covariance[column, column] ** 0.5))
+            fit.pressure: (float(getattr(fit.parameters, name)), fit.covariance.item(column, column) ** 0.5)
             for fit in (level.fit for level in levels)
             if name not in fit.undetermined
         }
@@ -244,7 +245,7 @@ LOOP_COLUMNS = {
 _DIGITS = 2
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class MeasuredLife:
     """A life of a clutch with the fitted curves of its stationary tests and its receipts, both by run_id, and the rows of
     its engagements (`engagements.over_life`); `fraction` of the initial mean COF ends it where nothing else is said.
@@ -259,9 +260,16 @@ class MeasuredLife:
     engagements: Sequence[Mapping[str, Any]] = ()
     filters: States = field(default_factory=dict)
 
-    @property
+    @cached_property
     def tests(self) -> list[Sequence[LevelFit]]:
         return tests_of(self.life, self.levels)
+
+    @cached_property
+    def determined(self) -> list[dict[float, StribeckFit]]:
+        """Of each event the fits that determine all four parameters, by pressure [Pa]."""
+        return [
+            {level.fit.pressure: level.fit for level in levels if not level.fit.undetermined} for levels in self.tests
+        ]
 
     def series(self, quantity: Quantity, speeds: Sequence[float] = SLOPE_SPEEDS) -> list[Series]:
         """The series of a quantity wherever it was measured; of a slope at `speeds` [rpm]."""
@@ -356,20 +364,19 @@ def pressure_level(measured: MeasuredLife, tracks: ParameterTracks, direct: Trac
     `direct` is mean COF at that pressure. Raises KeyError where a parameter has no track there.
     """
     series, posterior = direct
-    progress, fits = [], []
+    cycles, fits = [], []
     tests = list(zip(measured.life.events, measured.tests, strict=True))
-    for event, levels in tests:
-        determined = {level.fit.pressure: level.fit for level in levels if not level.fit.undetermined}
-        near = nearest_pressure(pressure, list(determined))
+    for event, determined in zip(measured.life.events, measured.determined, strict=True):
+        near = pressure if pressure in determined else nearest_pressure(pressure, list(determined))
         if near is not None:
-            progress.append(float(series.scale.progress(event.cycles)))
+            cycles.append(event.cycles)
             fits.append(determined[near])
     # COF is torque over the pressure that was measured in the first test with COFs, so torque is made with the same pressure
     reference = next((levels for event, levels in tests if event.cofs and levels), ())
     measured_at = {level.fit.pressure: level.mean_pressure for level in reference}
     near = nearest_pressure(pressure, list(measured_at))
     return PressureLevel(
-        progress=np.array(progress),
+        progress=series.scale.progress(np.array(cycles)),
         parameters=np.array([fit.parameters.as_array() for fit in fits]),
         covariance=np.array([fit.unbiased_covariance for fit in fits]),
         parameter_tracks=[tracks[name, pressure][1] for name in PARAMETER_NAMES],

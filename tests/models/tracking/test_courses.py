@@ -1,7 +1,7 @@
 """Courses and their knees, the model's discrepancy, both as one linear model, priors and draws."""
 
 import math
-from dataclasses import asdict, replace
+from dataclasses import asdict, fields, replace
 from typing import Any
 
 import numpy as np
@@ -354,3 +354,37 @@ def test_draws_share_out_weights_and_are_even() -> None:
         return float(np.sqrt(np.mean((shares - edges.prod(axis=1)) ** 2)))
 
     assert error(points) < 0.5 * error(rng.random((1_000, 3)))
+
+
+def test_a_long_history_is_summed_by_blocks_as_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The witness is the plain sum over all tests; a point's sums are the same to the last bit whatever is beside it."""
+    rng, tests, count = np.random.default_rng(3), 300, 200
+    progress = rng.permutation(np.linspace(0.0, 5e4, tests))
+    values = 0.134 - 0.05 * progress / 5e4 + 4e-4 * rng.standard_normal(tests)
+    measurements = sent(progress, values, 1e-8 * rng.uniform(0.5, 2.0, tests), np.floor(progress / 2e4))
+    history = History.of(measurements, BELIEF)
+    points = linear_model.Points(
+        log_scale=rng.normal(11.5, 0.5, count),
+        log_exponent=rng.normal(-0.3, 0.3, count),
+        log_scatter=rng.normal(np.log(4e-4), 0.3, count),
+        form=np.arange(count) % courses.FORM_COURSE.size,
+        outlying=(rng.random((tests, count)) < 0.02).astype(float),
+    )
+
+    def taken(index: np.ndarray) -> linear_model.Points:
+        columns = {name: getattr(points, name)[index] for name in ("log_scale", "log_exponent", "log_scatter", "form")}
+        return linear_model.Points(outlying=points.outlying[:, index], **columns)
+
+    sums, terms = linear_model.pointwise(history, BELIEF, points)
+    some = rng.permutation(count)[:77]
+    alone, _ = linear_model.pointwise(history, BELIEF, taken(some))
+    again, _ = linear_model.solved_at((sums, terms), some)
+    for field in fields(linear_model.Sums):
+        np.testing.assert_array_equal(getattr(alone, field.name), getattr(sums, field.name)[some])
+        np.testing.assert_array_equal(getattr(again, field.name), getattr(alone, field.name))
+    monkeypatch.setattr(linear_model, "WHOLE", tests)
+    plain, plain_terms = linear_model.pointwise(history, BELIEF, points)
+    # log probabilities are differences of sums weighted by up to 1e8
+    at_once = linear_model.evidence(plain, BELIEF)
+    np.testing.assert_allclose(linear_model.evidence(sums, BELIEF), at_once, rtol=1e-8, atol=1e-4)
+    np.testing.assert_array_equal(terms.where, plain_terms.where)

@@ -1,0 +1,202 @@
+"""A clutch's history at its present revision: what was read before is kept in memory, and only what came since is read.
+
+A run that is appended to the history, which changes nothing that was there, is stored with the revision that it follows.
+From a history at an earlier revision the present one is reached where every revision in between is that of such a run. Any
+other change (a run that is confirmed, corrected or withdrawn, a new level, a model that is adopted, a replay) leaves a gap:
+then all is read again. So it does not matter which process or service stored the runs.
+"""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import reduce
+
+import numpy as np
+from sqlalchemy import Connection
+
+from models.friction.criteria import ACCEPTABLE_MSE
+from models.friction.identification import FitStatus, StribeckFit
+from models.friction.stribeck import PARAMETER_NAMES, StribeckParameters
+from service.lives.history import ByPressure, Event, Shown, duty_block, maintenance_fields, moment_of, order, with_event
+from service.lives.run_analysis import LevelFit
+from storage import assumptions, clutches, results, runs
+from storage.clutches import ClutchRow
+from storage.engine.database import kept_of
+from storage.results import FitRow
+from storage.runs import RunInOrder
+
+#: What the details of a run that was appended say: the revision of the clutch that it follows.
+FOLLOWS = "follows"
+#: Bytes that a run takes in memory, a mean COF at one pressure, a number of a model's draws, and a fitted curve. Derived: of
+#: the sizes of their objects, rounded up.
+_RUN, _COF, _DRAW, _FIT = 1_500, 250, 32, 2_500
+#: Columns of a stored fit that are a fit's own.
+FIT_COLUMNS = ("pressure", "undetermined", "noise", "mse_percent", "rmse", "points", "message")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class KeptHistory:
+    """The history of a clutch at a revision: accepted and held runs, ordered, the greatest key among all its runs, and about
+    how many bytes it takes."""
+
+    revision: int
+    last_key: int
+    new_levels: frozenset[str]
+    events: tuple[Event, ...]
+    held: tuple[Event, ...]
+    size: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class KeptFits:
+    """The fits of all runs of a clutch at a revision, by run_id, and the greatest key among its runs."""
+
+    revision: int
+    last_key: int
+    levels: Mapping[str, list[LevelFit]]
+
+
+def history(connection: Connection, row: ClutchRow) -> KeptHistory:
+    """The history of a clutch at the revision of its row, which was read by the same transaction."""
+    kept = kept_of(connection)
+    if kept is None:  # what a transaction that writes has changed may be rolled back
+        return _read(connection, row)
+    name = ("history", row.clutch_id)
+    before: KeptHistory | None = kept.get(name)
+    if before is not None and before.revision == row.revision:
+        return before
+    now = None if before is None else _continued(connection, row, before)
+    if now is None:
+        now = _read(connection, row)
+    kept.put(name, now, now.size)
+    return now
+
+
+def _read(connection: Connection, row: ClutchRow) -> KeptHistory:
+    """All of it."""
+    accepted, held = _events(connection, row, runs.in_history(connection, row.clutch_id))
+    return KeptHistory(
+        revision=row.revision,
+        last_key=runs.last_key(connection, row.clutch_id),
+        new_levels=_new_levels(row),
+        events=order(accepted),
+        held=order(held),
+        size=_size([*accepted, *held]),
+    )
+
+
+def _continued(connection: Connection, row: ClutchRow, before: KeptHistory) -> KeptHistory | None:
+    """A history with the runs that were appended since; None where anything else has changed."""
+    appended = appended_since(connection, row.clutch_id, before.revision, before.last_key, row.revision)
+    if appended is None or _new_levels(row) != before.new_levels:
+        return None
+    accepted, held = _events(connection, row, appended, beyond=before.last_key)
+    return replace(
+        before,
+        revision=row.revision,
+        last_key=appended[-1].run_key,
+        events=reduce(with_event, accepted, before.events),
+        held=reduce(with_event, held, before.held),
+        size=before.size + _size([*accepted, *held]),
+    )
+
+
+def _size(events: Sequence[Event]) -> int:
+    """About how many bytes they take."""
+    each = (_RUN + _COF * len(event.cofs) + _DRAW * sum(map(len, event.under.values())) for event in events)
+    return sum(each)
+
+
+def appended_since(
+    connection: Connection, clutch_id: str, revision: int, last_key: int, now: int
+) -> list[RunInOrder] | None:
+    """The runs by which a clutch came from a revision, when it had runs up to a key, to its present one, in the order of
+    their arrival; None where something else has changed it too."""
+    if now <= revision:
+        return None
+    rows = sorted(runs.after_key(connection, clutch_id, last_key), key=lambda run: run.run_key)
+    return rows if [run.follows for run in rows] == list(range(revision, now)) else None
+
+
+def _events(
+    connection: Connection, row: ClutchRow, rows: Sequence[RunInOrder], beyond: int = 0
+) -> tuple[list[Event], list[Event]]:
+    """Accepted runs as the history sees them, mean COF as the model in force corrects it; and held ones, with the mean COFs
+    that they would have in it. All of them have keys `beyond` that one."""
+    cofs = results.cofs_of(connection, row.clutch_id, beyond)
+    corrected, new_levels = assumptions.corrected_cofs_of(connection, row.clutch_id, beyond), _new_levels(row)
+    accepted, held = [], []
+    for run in rows:
+        event = event_of(run, cofs.get(run.run_key, {}))
+        if run.state == runs.HELD:
+            held.append(replace(event, confirmed=False))
+            continue
+        event = event.corrected(corrected.get(run.run_key))
+        accepted.append(replace(event, new_level=True) if run.run_id in new_levels else event)
+    return accepted, held
+
+
+def levels(connection: Connection, clutch_id: str) -> dict[str, list[LevelFit]]:
+    """The fits of all runs of a clutch, by run_id."""
+    kept, revision = kept_of(connection), clutches.revision(connection, clutch_id)
+    if kept is None or revision is None:
+        return _levels(connection, clutch_id)
+    name = ("fits", clutch_id)
+    before: KeptFits | None = kept.get(name)
+    if before is not None and before.revision == revision:
+        return dict(before.levels)
+    appended = None
+    if before is not None:
+        appended = appended_since(connection, clutch_id, before.revision, before.last_key, revision)
+    if before is None or appended is None:
+        own, last_key = _levels(connection, clutch_id), runs.last_key(connection, clutch_id)
+    else:
+        further = _levels(connection, clutch_id, beyond=before.last_key)
+        own, last_key = {**before.levels, **further}, appended[-1].run_key
+    now = KeptFits(revision=revision, last_key=last_key, levels=own)
+    kept.put(name, now, _FIT * sum(map(len, own.values())))
+    return dict(own)
+
+
+def _levels(connection: Connection, clutch_id: str, beyond: int = 0) -> dict[str, list[LevelFit]]:
+    """Those of runs with keys `beyond` that one, by their order."""
+    names = {run_key: run_id for run_id, run_key in runs.keys(connection, clutch_id).items()}
+    of_runs = results.fits_of(connection, clutch_id, beyond)
+    return {names[run_key]: [level_fit(row) for row in rows] for run_key, rows in of_runs.items()}
+
+
+def level_fit(row: FitRow) -> LevelFit:
+    """The inverse of `records.fit_rows`, exactly."""
+    fit = StribeckFit(
+        **{name: getattr(row, name) for name in FIT_COLUMNS},
+        parameters=StribeckParameters(**{name: getattr(row, name) for name in PARAMETER_NAMES}),
+        covariance=np.reshape(row.covariance, (4, 4)),
+        unbiased_covariance=np.reshape(row.unbiased_covariance, (4, 4)),
+        status=FitStatus(row.status),
+        acceptable=row.mse_percent is not None and row.mse_percent < ACCEPTABLE_MSE,
+    )
+    return LevelFit(mean_pressure=row.mean_pressure, speeds=row.speeds, fit=fit)
+
+
+def _new_levels(row: ClutchRow) -> frozenset[str]:
+    return frozenset(row.summary.get("new_levels", ()))
+
+
+def event_of(row: RunInOrder, cofs: ByPressure) -> Event:
+    """A stored run as the history sees it."""
+    low, high = row.lowest_speed, row.highest_speed
+    return Event(
+        run_id=row.run_id,
+        kind=row.kind,
+        cycles=row.cycles,
+        moment=moment_of(row.started_at, row.received_at),
+        arrived=row.run_key,
+        speed_range=None if low is None or high is None else (low, high),
+        oil_temperature=row.oil_temperature,
+        cofs=cofs,
+        **maintenance_fields(row.event, row.reason),
+        duty=duty_block(row.cycles, row.duty_cycles, row.duty_energy_kj, row.duty_speed_rpm, row.duty_duration_s),
+        dated=row.started_at is not None,
+        shown=None if row.shown is None else Shown.from_list(json.loads(row.shown)),
+        confirmed=bool(row.doubted),
+    )
