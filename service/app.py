@@ -11,22 +11,22 @@ from fastapi import FastAPI
 from fastapi_offline import FastAPIOffline
 
 from service.alarms.outbox import Outbox
+from service.answers.cache import AnswerCache, Revalidation
+from service.changes import adopt_model, ask_job, raw_records, run_diagnosis
 from service.dashboard import assets, site
 from service.dashboard import pages as dashboard
-from service.queries.cache import AnswerCache, Revalidation
+from service.jobs.queue import JobQueue, Kind, diagnosis_work, work_of_change
+from service.jobs.workers import CHANGE_SECONDS, Lane, Workers, in_processes, in_threads
 from service.settings import CODE_VERSION, MIB, Settings
 from service.web import openapi, problems
-from service.web.answers import now
 from service.web.context import Context
 from service.web.files import emptied_folder
 from service.web.limits import MAX_CACHED_BYTES
 from service.web.metrics import Metrics
 from service.web.middleware import BodyLimit, Edge, Encodings, Heads, Polls, RootPath, Shares
 from service.web.readiness import Readiness
+from service.web.responses import now
 from service.web.routes import alarms, clutches, diagnoses, exports, health, inspections, jobs, life, rigs, runs
-from service.work.queue import JobQueue, Kind, diagnosis_work, workflow_work
-from service.work.workers import CHANGE_SECONDS, Lane, Workers, in_processes, in_threads
-from service.workflows import adopt_model, ask_job, raw_records, run_diagnosis
 from storage.engine.database import Database
 from storage.engine.opening import open_database, service_lock
 from storage.jobs import DIAGNOSIS, FLEET_REFRESH, REPLAY, JobRow
@@ -60,8 +60,8 @@ def _kinds(database: Database, workers: Workers) -> Sequence[Mapping[str, Kind]]
     return (
         {DIAGNOSIS: Kind(diagnosis_work, finish_diagnosis)},
         {
-            REPLAY: Kind(workflow_work("service.workflows.replay:as_job"), finish),
-            FLEET_REFRESH: Kind(workflow_work("service.workflows.learn_fleet:as_job"), finish),
+            REPLAY: Kind(work_of_change("service.changes.replay:as_job"), finish),
+            FLEET_REFRESH: Kind(work_of_change("service.changes.learn_fleet:as_job"), finish),
         },
     )
 

@@ -15,10 +15,10 @@ from sqlalchemy import Connection
 
 from service.alarms import rules
 from service.alarms.rules import Facts, Finding
-from service.lives.condition import state_of
-from service.schemas.alarm import AlarmIn, EventOut
-from service.schemas.base import schema_fields
-from service.schemas.clutch import ClutchIn
+from service.api.alarm import AlarmIn, EventOut
+from service.api.base import schema_fields
+from service.api.clutch import ClutchIn
+from service.clutch.condition import state_of
 from storage import alarms, clutches, webhooks
 from storage.alarms import AlarmRow, EventRow
 from storage.clutches import ClutchRow

@@ -13,13 +13,14 @@ from sqlalchemy import Connection
 from models.clutch import Geometry
 from models.friction.stribeck import PARAMETER_NAMES, StribeckParameters, slope, slope_gradient
 from models.prognosis.first_passage import PassageStatus
-from service.columns import RADIANS_PER_SECOND_PER_RPM, bar
-from service.lives import condition
-from service.lives.assumptions import ALL_PRESSURES
-from service.lives.history import STATIONARY
-from service.lives.payloads import ENDED, INSUFFICIENT, OFF_TRACK
-from service.lives.plausibility.doubts import OFF_COURSE
-from service.schemas.alarm import AlarmIn
+from service.api.alarm import AlarmIn
+from service.channels import RADIANS_PER_SECOND_PER_RPM, bar
+from service.clutch import condition
+from service.clutch.assumptions import ALL_PRESSURES
+from service.clutch.items import ENDED, INSUFFICIENT
+from service.clutch.notices import OFF_TRACK
+from service.clutch.plausibility.doubts import OFF_COURSE
+from service.clutch.timeline import STATIONARY
 from storage import alarms, diagnoses, results, runs
 from storage.clutches import ClutchRow
 from storage.results import FitRow

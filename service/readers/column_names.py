@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from enum import Enum
 from functools import lru_cache
 
-from service.columns import CHANNELS
+from service.channels import CHANNELS
 from service.errors import MAX_QUOTED, FieldError, InvalidError
 from service.readers.limits import LONGEST_MAP, LONGEST_NAME, LONGEST_TITLE, LONGEST_UNIT
 from service.readers.table import NO_TIME, Choice, Column, Reading

@@ -23,10 +23,10 @@ from service.readers.column_names import (
     recognised,
     several_times,
 )
-from service.readers.grid import is_value
 from service.readers.limits import LIMITS
 from service.readers.numerals import plain, read_cells
 from service.readers.table import NO_TIME, Clock, Column, Reading, Table
+from service.readers.table_finder import is_value
 from service.readers.unit_table import is_unit
 
 #: Rows of a table without lines by which its columns are judged, as many as others show.

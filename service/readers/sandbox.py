@@ -24,9 +24,9 @@ from typing import Any, BinaryIO, Literal
 
 import numpy as np
 
-from service.columns import CHANNELS
+from service.channels import CHANNELS
 from service.errors import BusyError, FieldError, InvalidError, Notice, ServiceError, TooLargeError, exit_text
-from service.readers.channels import Channels, to_channels
+from service.readers.assemble import Channels, to_channels
 from service.readers.confinement import close_files, close_network_and_processes
 from service.readers.detect import Format, is_packed, opened, overdue, too_slow
 from service.readers.limits import Limits

@@ -11,7 +11,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
-from service.columns import LineOf
+from service.channels import LineOf
 from service.errors import MAX_QUOTED, InvalidError, Notice
 
 #: The time option that takes no clock: each row is a plateau.

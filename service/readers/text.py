@@ -23,10 +23,10 @@ from models.arrays import FloatArray
 from service.errors import MAX_ERRORS, MAX_QUOTED, FieldError, InvalidError, TooLargeError
 from service.readers.column_names import named_columns, recognised
 from service.readers.detect import ByteSource, Format, overdue, too_slow
-from service.readers.grid import MAX_ROWS, TURNED, DataRows, Layout, find_table, no_table, table_in, turned
 from service.readers.limits import LIMITS, LONGEST_LINE_BYTES, Limits
 from service.readers.numerals import Numerals, is_stamp
 from service.readers.table import Reading, Table
+from service.readers.table_finder import MAX_ROWS, TURNED, DataRows, Layout, find_table, no_table, table_in, turned
 
 #: Bytes of a block; the first must hold the titles. Chosen: rows that are no plain numbers take 60 times as much memory.
 _BLOCK = 1 << 17

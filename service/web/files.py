@@ -13,10 +13,10 @@ from fastapi import Request
 from fastapi.responses import Response, StreamingResponse
 from starlette.datastructures import UploadFile
 
+from service.api.rig import RigProfile
 from service.errors import InvalidError
-from service.run_files.json_run import checked
-from service.run_files.rig_profile import require_usable
-from service.schemas.rig import RigProfile
+from service.runs.json_run import checked
+from service.runs.rig_profile import require_usable
 from service.web.limits import MAX_BYTES_IN_MEMORY
 
 FILE_TYPE = "application/octet-stream"

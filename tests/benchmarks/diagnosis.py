@@ -12,7 +12,7 @@ from models.diagnosis.diagnose import diagnose
 from models.rig import campaign
 from models.rig.programme import QUICK, WHOLE, Programme
 from models.rig.temperatures import warmed
-from service.run_files.simulated import simulated_body
+from service.runs.simulated import simulated_body
 from tests.blind.rig import sent
 from tests.blind.rig.hide import hide
 from tests.blind.test_blind import FAMILIES

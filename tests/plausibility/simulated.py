@@ -11,7 +11,7 @@ from models.rig.sampled import DynamicTest, RawTest
 from models.rig.simulated_runs import DutyBlock, RunKind, SimulatedRun
 from models.rig.stationary import Sensor, stationary_test
 from models.rig.truth import SimulatedClutch
-from service.run_files.simulated import simulated_body
+from service.runs.simulated import simulated_body
 from tests.plausibility.bench import Body, with_gain
 
 BEGUN = datetime(2026, 1, 5, 8, tzinfo=UTC)

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from models.friction.pressure_laws import AsymptoticLaw, LinearLaw
-from service.schemas.clutch import ClutchIn
-from service.schemas.life import QuantityName
+from service.api.clutch import ClutchIn
+from service.api.life import QuantityName
 from tests.browser.driving import FLAT, chromium
 from tests.browser.modules import Module, load, open_page
 from tests.support import Server, serving

@@ -14,7 +14,7 @@ import httpx2
 import pytest
 from fastapi.testclient import TestClient
 
-from service.queries import scores
+from service.answers import scores
 from service.web import limits
 from service.web.files import emptied_folder
 from service.web.routes import runs

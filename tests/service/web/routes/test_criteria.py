@@ -11,7 +11,7 @@ from models.friction.stribeck import StribeckParameters, torque
 from models.rig.campaign import simulate
 from models.rig.programme import Programme
 from models.rig.sampled import DynamicTest
-from service.run_files.simulated import simulated_body
+from service.runs.simulated import simulated_body
 from tests.service.clients import filled_client, post_run
 from tests.support import one_quick
 
