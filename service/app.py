@@ -15,7 +15,7 @@ from service.answers.cache import AnswerCache, Revalidation
 from service.changes import adopt_model, ask_job, raw_records, run_diagnosis
 from service.dashboard import assets, site
 from service.dashboard import pages as dashboard
-from service.jobs.queue import JobQueue, Kind, diagnosis_work, work_of_change
+from service.jobs.queue import JobKind, JobQueue, diagnosis_work, work_of_change
 from service.jobs.workers import CHANGE_SECONDS, Lane, Workers, in_processes, in_threads
 from service.settings import CODE_VERSION, MIB, Settings
 from service.web import openapi, problems
@@ -37,7 +37,7 @@ Post the Stribeck tests of a rig. The service fits each test, tracks the clutch'
 uncertainty, how many duty cycles remain until the mean coefficient of friction has halved."""
 
 
-def _kinds(database: Database, workers: Workers) -> Sequence[Mapping[str, Kind]]:
+def _kinds(database: Database, workers: Workers) -> Sequence[Mapping[str, JobKind]]:
     """How jobs are done, by their kind, and their ends stored: what somebody wants adopted is tracked again by the workers.
 
     Of each group one is done at a time: a diagnosis does not wait until a thousand clutches are replayed.
@@ -58,10 +58,10 @@ def _kinds(database: Database, workers: Workers) -> Sequence[Mapping[str, Kind]]
         ask_job.finish(database, job, ended, at=now())
 
     return (
-        {DIAGNOSIS: Kind(diagnosis_work, finish_diagnosis)},
+        {DIAGNOSIS: JobKind(diagnosis_work, finish_diagnosis)},
         {
-            REPLAY: Kind(work_of_change("service.changes.replay:as_job"), finish),
-            FLEET_REFRESH: Kind(work_of_change("service.changes.learn_fleet:as_job"), finish),
+            REPLAY: JobKind(work_of_change("service.changes.replay:as_job"), finish),
+            FLEET_REFRESH: JobKind(work_of_change("service.changes.learn_fleet:as_job"), finish),
         },
     )
 

@@ -1,6 +1,6 @@
 """Converts between database rows and values: loads the state of a clutch and its runs, and stores its results.
 
-A change reads a `ClutchState`, computes outside any transaction, and stores with `unchanged` and `store`. Stored runs are
+A change reads a `ClutchHistory`, computes outside any transaction, and stores with `unchanged` and `store`. Stored runs are
 as they were sent, each read in a transaction of its own when it is asked for; `recomputed` computes all results from them.
 """
 
@@ -19,9 +19,9 @@ from sqlalchemy import Connection
 
 from models.degradation.severity import Severity
 from models.friction.criteria import ACCEPTABLE_MSE
-from models.friction.identification import FitStatus, StribeckFit
+from models.friction.identification import StribeckFit, StribeckFitStatus
 from models.friction.stribeck import PARAMETER_NAMES, StribeckParameters
-from models.prognosis.ended_lives import EndedLife
+from models.prognosis.ended_lives import ObservedLife
 from models.prognosis.fleet import FleetPrior
 from service.alarms import raising
 from service.api.base import schema_fields
@@ -40,7 +40,7 @@ from service.clutch.model_correction import RunReader, extension_of
 from service.clutch.plausibility.doubts import Judged, doubts_alone
 from service.clutch.recomputation import (
     Adoption,
-    ClutchState,
+    ClutchHistory,
     Levels,
     Receipt,
     Results,
@@ -60,7 +60,7 @@ from service.clutch.timeline import (
     stationary_tests_of,
 )
 from service.clutch.tracking import CARRIED, States, Tracked
-from service.clutch.with_held import Evidence, engagement_rows, needs_evidence, summarised
+from service.clutch.with_held import ClutchMeasurements, engagement_rows, needs_evidence, summarised
 from service.errors import BusyError, InvalidError, NotFoundError, unknown_clutch
 from service.logging import request_id
 from service.settings import CODE_VERSION
@@ -133,7 +133,7 @@ def state(
     edited: ClutchIn | None = None,
     carried: bool = False,
     newest_prior: bool = False,
-) -> ClutchState:
+) -> ClutchHistory:
     """The clutch's state at its present revision. Raises NotFoundError.
 
     `also`: an extension that may come into force; what fleets taught for its severity is loaded beside the others'.
@@ -148,7 +148,7 @@ def state(
     severities = {severity_under(own, exponent) for exponent in exponents}
     last = results.prediction_at(connection, clutch_id, CARRIED[0], ALL_PRESSURES)
     tracked = {} if last is None or newest_prior or edited is not None else last.payload
-    return ClutchState(
+    return ClutchHistory(
         record=own,
         revision=row.revision,
         events=events(connection, clutch_id),
@@ -287,7 +287,7 @@ def attempts(clutch_id: str) -> Iterator[int]:
     )
 
 
-def replace_results(database: Database, state: ClutchState, computed: Results) -> bool:
+def replace_results(database: Database, state: ClutchHistory, computed: Results) -> bool:
     """Store a clutch's results where its revision still is that of the state they follow from; whether it was. The revision
     moves on where an answer changes."""
     with database.writing() as connection:
@@ -383,7 +383,7 @@ def _learned_prior(
     if row is None:
         return LearnedPrior()
     fleet = FleetPrior.from_dict(row.content)
-    ended = tuple(EndedLife.from_dict(life) for name in ("ended", "censored") for life in row.content.get(name, ()))
+    ended = tuple(ObservedLife.from_dict(life) for name in ("ended", "censored") for life in row.content.get(name, ()))
     return LearnedPrior(
         fleet=fleet, ended=ended, name={"name": FLEET, "version": row.version, "clutches": fleet.clutches}
     )
@@ -438,7 +438,7 @@ def _level_fit(row: FitRow) -> LevelFit:
         parameters=StribeckParameters(**{name: getattr(row, name) for name in PARAMETER_NAMES}),
         covariance=np.reshape(row.covariance, (4, 4)),
         unbiased_covariance=np.reshape(row.unbiased_covariance, (4, 4)),
-        status=FitStatus(row.status),
+        status=StribeckFitStatus(row.status),
         acceptable=row.mse_percent is not None and row.mse_percent < ACCEPTABLE_MSE,
     )
     return LevelFit(mean_pressure=row.mean_pressure, speeds=row.speeds, fit=fit)
@@ -510,16 +510,16 @@ def photograph_answer(row: PhotographRow) -> dict[str, Any]:
     return schema_fields(PhotographOut, row, photograph_id=row.sha256)
 
 
-def evidence(connection: Connection, clutch_id: str) -> Evidence:
+def evidence(connection: Connection, clutch_id: str) -> ClutchMeasurements:
     """What was measured of a clutch, of held runs too; without a reader of its runs."""
-    return Evidence(
+    return ClutchMeasurements(
         levels=levels(connection, clutch_id),
         receipts=receipts(connection, clutch_id),
         engagements=_engagements(connection, clutch_id),
     )
 
 
-def evidence_for(database: Database, state: ClutchState, reader: RunReader) -> Evidence | None:
+def evidence_for(database: Database, state: ClutchHistory, reader: RunReader) -> ClutchMeasurements | None:
     """What a clutch's summary follows from beside its tracks; None where these are enough."""
     if not needs_evidence(state):
         return None
@@ -527,7 +527,7 @@ def evidence_for(database: Database, state: ClutchState, reader: RunReader) -> E
         return replace(evidence(connection, state.clutch_id), reader=reader)
 
 
-def tracked_again(database: Database, state: ClutchState, levels: Levels, receipts: Mapping[str, Receipt]) -> Results:
+def tracked_again(database: Database, state: ClutchHistory, levels: Levels, receipts: Mapping[str, Receipt]) -> Results:
     """Results of a clutch whose state has changed while its runs are unchanged."""
     reader = run_reader(database, state.clutch_id)
     final, computed = computed_again(state, levels, receipts, reader, evaluated=stationary_tests_of(state.events))
@@ -634,13 +634,13 @@ class Recorded:
     """All that a clutch's results are computed from: its state, its runs in the order of their arrival, those that are none
     of the history, and their channels. Picklable where it was loaded whole."""
 
-    state: ClutchState
+    state: ClutchHistory
     rows: tuple[RunRow, ...]
     aside: Mapping[str, Event]
     reader: RunReader
 
 
-def recorded(database: Database, state: ClutchState, *, whole: bool = False) -> Recorded:
+def recorded(database: Database, state: ClutchHistory, *, whole: bool = False) -> Recorded:
     """The clutch's runs as they are stored; `whole` with all channels in memory, else each is read when it is needed."""
     with database.reading() as connection:
         rows, aside = runs.page(connection, state.clutch_id), set_aside(connection, state.clutch_id)
@@ -676,7 +676,7 @@ def recomputed(recorded: Recorded) -> Results:
     computed = with_set_aside(computed, final, set_aside, levels, receipts, reader)
     receipts |= computed.receipts
     engagements = {row.run_id: stored_engagement(receipts[row.run_id], details[row.run_id]) for row in rows}
-    evidence = Evidence(
+    evidence = ClutchMeasurements(
         levels=levels,
         receipts=receipts,
         engagements={run_id: engagement for run_id, engagement in engagements.items() if engagement is not None},

@@ -18,7 +18,7 @@ OF_CLUTCH = (OTHER_CLUTCH, OTHER_TEST)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Reading:
+class RunReading:
     """What a run shows, as sent or without a slip.
 
     `cycles` since new; `log_cof` the logarithm of mean COF as the stationary tests of its life show it and `spread` its own
@@ -37,7 +37,7 @@ class Slip:
 
     name: str
     log_prior: float
-    likely: Reading
+    likely: RunReading
     unit: str = ""
 
 
@@ -52,7 +52,7 @@ class Run:
 
     name: str
     kind: str
-    sent: Reading
+    sent: RunReading
     slips: Callable[[], Iterable[Slip]] = tuple
     tests: bool = False
     block: float | None = None

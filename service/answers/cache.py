@@ -55,7 +55,7 @@ class Page:
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
+class CachedAnswer:
     """An answer's bytes, the strong entity tag that follows from them, and the cursor of the next page where one follows."""
 
     body: bytes
@@ -68,7 +68,7 @@ class Answer:
         return len(self.body) + KEPT_BESIDE_BYTES
 
     @classmethod
-    def of(cls, made: bytes | Page) -> "Answer":
+    def of(cls, made: bytes | Page) -> "CachedAnswer":
         """The answer with its tag. The tag of a page covers its cursor, which is not in its bytes."""
         if isinstance(made, Page):
             digest = hashlib.sha256(made.body + (made.next or "").encode())
@@ -132,11 +132,13 @@ class AnswerCache:
         self._held = 0
         self._begun = 0
         self.pinned: set[Hashable] = set()
-        self._answers: OrderedDict[Hashable, tuple[Hashable, Answer, int]] = OrderedDict()  # and which begin it was
-        self._making: dict[tuple[Hashable, Hashable], Future[Answer]] = {}
+        self._answers: OrderedDict[Hashable, tuple[Hashable, CachedAnswer, int]] = (
+            OrderedDict()
+        )  # and which begin it was
+        self._making: dict[tuple[Hashable, Hashable], Future[CachedAnswer]] = {}
         self._lock = threading.Lock()
 
-    def held(self, key: Hashable, version: Hashable) -> Answer | None:
+    def held(self, key: Hashable, version: Hashable) -> CachedAnswer | None:
         """The answer for `key` where it is there and of `version`."""
         with self._lock:
             return self._current(key, version)
@@ -145,7 +147,7 @@ class AnswerCache:
         with self._lock:
             return key in self._answers
 
-    def newest(self, key: Hashable) -> tuple[Any, Answer] | None:
+    def newest(self, key: Hashable) -> tuple[Any, CachedAnswer] | None:
         """The answer for `key`, of whichever version, and that version; None where none is there."""
         with self._lock:
             if key not in self._answers:
@@ -153,13 +155,13 @@ class AnswerCache:
             self._answers.move_to_end(key)
             return self._answers[key][:2]
 
-    def put(self, key: Hashable, version: Hashable, answer: Answer) -> None:
+    def put(self, key: Hashable, version: Hashable, answer: CachedAnswer) -> None:
         """Hold an answer that was made elsewhere, in place of what there was."""
         with self._lock:
             self._begun += 1
             self._hold(key, version, answer, self._begun)
 
-    def answer(self, key: Hashable, version: Hashable, make: Callable[[], bytes | Page]) -> Answer:
+    def answer(self, key: Hashable, version: Hashable, make: Callable[[], bytes | Page]) -> CachedAnswer:
         """The answer for `key` and `version`, made by `make` where it is not there. All who wait get what that raises."""
         with self._lock:
             cached = self._current(key, version)
@@ -175,7 +177,7 @@ class AnswerCache:
         self._make(key, version, make, mine, begun)
         return mine.result()
 
-    def _current(self, key: Hashable, version: Hashable) -> Answer | None:
+    def _current(self, key: Hashable, version: Hashable) -> CachedAnswer | None:
         cached_version, answer, _ = self._answers.get(key, (None, None, 0))
         if answer is None or cached_version != version:
             return None
@@ -183,10 +185,15 @@ class AnswerCache:
         return answer
 
     def _make(
-        self, key: Hashable, version: Hashable, make: Callable[[], bytes | Page], pending: "Future[Answer]", begun: int
+        self,
+        key: Hashable,
+        version: Hashable,
+        make: Callable[[], bytes | Page],
+        pending: "Future[CachedAnswer]",
+        begun: int,
     ) -> None:
         try:
-            answer = Answer.of(make())
+            answer = CachedAnswer.of(make())
         except BaseException as error:  # noqa: BLE001  (raised again for each who asked)
             with self._lock:
                 del self._making[key, version]
@@ -198,7 +205,7 @@ class AnswerCache:
             del self._making[key, version]
         pending.set_result(answer)
 
-    def _hold(self, key: Hashable, version: Hashable, answer: Answer, begun: int) -> None:
+    def _hold(self, key: Hashable, version: Hashable, answer: CachedAnswer, begun: int) -> None:
         self._drop(key)
         if answer.size <= self._most:
             self._held += answer.size
@@ -217,7 +224,7 @@ class AnswerCache:
 #: What a worker returns: the revision that it computed the answer from, and the answer's bytes.
 Made = tuple[int, bytes]
 Compute = Callable[[bool], "Future[Made]"]
-_Making = asyncio.Task[tuple[int, Answer]]
+_Making = asyncio.Task[tuple[int, CachedAnswer]]
 
 
 class Revalidation:
@@ -242,9 +249,9 @@ class Revalidation:
     def begin(self, key: Hashable, revision: int, body: bytes) -> None:
         """Hold an answer that was made elsewhere, where none is known."""
         if not self.knows(key):
-            self._cache.put(key, revision, Answer.of(body))
+            self._cache.put(key, revision, CachedAnswer.of(body))
 
-    async def answer(self, key: Hashable, revision: int, compute: Compute, *, wait: float) -> tuple[int, Answer]:
+    async def answer(self, key: Hashable, revision: int, compute: Compute, *, wait: float) -> tuple[int, CachedAnswer]:
         """The answer at `revision` or later, or the last one where it is not there within `wait` [s]; and its revision.
 
         Where none was ever made, it is waited for. `compute` is told whether who asks waits; what it raises is raised to
@@ -285,7 +292,7 @@ class Revalidation:
 
     async def _make(
         self, key: Hashable, computing: "Future[Made]", tasks: dict[Hashable, _Making]
-    ) -> tuple[int, Answer]:
+    ) -> tuple[int, CachedAnswer]:
         try:
             revision, body = await asyncio.wrap_future(computing)
         finally:
@@ -295,7 +302,7 @@ class Revalidation:
         cached = self._cache.newest(key)
         if cached is not None and revision < cached[0]:  # a later one was quicker
             return cached
-        result = revision, Answer.of(body)
+        result = revision, CachedAnswer.of(body)
         self._cache.put(key, *result)
         return result
 

@@ -15,7 +15,7 @@ from service.api.clutch import ClutchOut
 from service.clutch.condition import STATES, stated
 from service.paging import Part, by_name, page_as_bytes
 from storage import clutches, diagnoses, runs
-from storage.clutches import Choice, ClutchRow
+from storage.clutches import ClutchRow, ClutchSelection
 from storage.engine.database import Database
 
 #: Share of the clutches whose bars fit, and the cycles at the bars' end where nothing is predicted. Chosen: one that lasts
@@ -35,7 +35,7 @@ def every(database: Database, *, at_once: int) -> Iterator[dict[str, Any]]:
     part: Part | None = Part(at_once)
     while part is not None:
         with database.reading() as connection:
-            rows = clutches.page(connection, Choice(), limit=part.most, after=part.after, by_name=True)
+            rows = clutches.page(connection, ClutchSelection(), limit=part.most, after=part.after, by_name=True)
             items = list(map(_item, _shown(connection, rows[:at_once])))
         yield from items
         place = part.next(rows, by_name("clutch_id"))
@@ -43,7 +43,7 @@ def every(database: Database, *, at_once: int) -> Iterator[dict[str, Any]]:
 
 
 def page_as_json(
-    database: Database, cache: AnswerCache, choice: Choice, part: Part, *, offset: int = 0, sort: str = "worst"
+    database: Database, cache: AnswerCache, choice: ClutchSelection, part: Part, *, offset: int = 0, sort: str = "worst"
 ) -> bytes:
     """A page of the clutches of a choice; each one's item is made once for its revision and verdict. By kind, a page's place
     is how many clutches are before it."""
@@ -69,7 +69,7 @@ def page_as_json(
     return page_as_bytes(list(map(item, clutches_shown)), part.next(rows, places[sort]))
 
 
-def totals(database: Database, choice: Choice) -> dict[str, Any]:
+def totals(database: Database, choice: ClutchSelection) -> dict[str, Any]:
     """How many clutches of a choice there are, and the cycles at the right end of their intervals' bars."""
     with database.reading() as connection:
         listed = clutches.counts(connection, choice)

@@ -31,7 +31,7 @@ from service.clutch.quantities.measured import (
     quantity_named,
     slopes_along,
 )
-from service.clutch.severity_estimate import SeverityEstimate, severity_estimate
+from service.clutch.severity_estimate import SeverityPosterior, severity_estimate
 from service.clutch.timeline import Series, reference_velocities
 from service.clutch.tracking import offset_of, step_rng
 from service.clutch.with_held import measured_life
@@ -191,7 +191,7 @@ def _from_parameters(
     return None if paths is None else _payload(paths, direct[ALL_PRESSURES], measured.fraction)
 
 
-def _severity_item(estimate: SeverityEstimate | None) -> dict[str, Any] | None:
+def _severity_item(estimate: SeverityPosterior | None) -> dict[str, Any] | None:
     if estimate is None:
         return None
     return {

@@ -7,8 +7,8 @@ import numpy as np
 
 from models.clutch import Geometry
 from models.engagements.comparison import bin_means
-from models.engagements.discrepancy import Discrepancy, discrepancy
-from models.engagements.measured import MeasuredEngagement, trace_times
+from models.engagements.discrepancy import EngagementDiscrepancy, discrepancy
+from models.engagements.measured import EngagementIndicators, trace_times
 from models.engagements.simulation import Capacity, Drive, Engagement, PressureProfile, capacity_of, engage
 from models.friction.stribeck import StribeckParameters
 from service import repository
@@ -90,7 +90,7 @@ def _compared_row(measured: Sequence[dict[str, Any]], life: Life, run_id: str | 
 def _comparison(run: IncomingRun, row: dict[str, Any], capacity: Capacity, geometry: Geometry) -> dict[str, Any] | None:
     """A measured engagement beside the model's; the model's part is null where the record does not show its drive."""
     engagement = evaluated(run, geometry)
-    if not isinstance(engagement, MeasuredEngagement):
+    if not isinstance(engagement, EngagementIndicators):
         return None
     slip = engagement.slip
     at = trace_times(slip)
@@ -105,7 +105,7 @@ def _comparison(run: IncomingRun, row: dict[str, Any], capacity: Capacity, geome
     }
 
 
-def _model_part(found: Discrepancy, contact: float) -> dict[str, Any]:
+def _model_part(found: EngagementDiscrepancy, contact: float) -> dict[str, Any]:
     """The model's engagement from the measured one's conditions, and how far the measured one is from it."""
     difference = found.stop_time_difference
     return {

@@ -8,7 +8,7 @@ import numpy as np
 
 from models.degradation.severity import SeverityBasis
 from models.prognosis.criteria import FEWEST_SEVERITIES
-from models.prognosis.ended_lives import EndedLife, severity_exponent
+from models.prognosis.ended_lives import ObservedLife, severity_exponent
 from models.prognosis.fleet import FleetPrior
 from service.api.base import schema_fields
 from service.api.fleet import FleetPriorOut
@@ -55,7 +55,7 @@ def _item(row: FleetPriorRow) -> dict[str, Any]:
 
 def _severity_exponent(row: FleetPriorRow) -> dict[str, float] | None:
     """The exponent q of life ∝ energy^-q by ended lives, with its deviation; None if they do not determine it."""
-    lives = [EndedLife.from_dict(stored) for stored in row.content.get("ended", ())]
+    lives = [ObservedLife.from_dict(stored) for stored in row.content.get("ended", ())]
     by_energy = [(life.end, life.energy) for life in lives if life.energy]
     if len(by_energy) < FEWEST_SEVERITIES or len({energy for _, energy in by_energy}) == 1:
         return None

@@ -15,7 +15,7 @@ from models.arrays import FloatArray
 from models.clutch import Geometry
 from models.degradation.severity import (
     Block,
-    Programme,
+    DutyProgramme,
     Severity,
     SeverityBasis,
     SeverityMap,
@@ -31,7 +31,7 @@ from service.api.life import PlannedBlock, ProgrammeIn
 from service.channels import PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM
 from service.clutch.condition import with_held_runs
 from service.clutch.items import ENDED, INSUFFICIENT, SAFE, by_quantile, ended, notice_items
-from service.clutch.recomputation import ClutchState
+from service.clutch.recomputation import ClutchHistory
 from service.clutch.timeline import Event, Series, date_of, moment_at, pace_of
 from service.clutch.tracking import advance, drawn, end_of_life, predict, predict_at, step_rng
 from service.clutch.with_held import with_held
@@ -75,7 +75,7 @@ def planned_life(database: Database, clutch_id: str, method: str, planned: Progr
     }
 
 
-def _prediction(state: ClutchState, method: str, planned: ProgrammeIn) -> dict[str, Any]:
+def _prediction(state: ClutchHistory, method: str, planned: ProgrammeIn) -> dict[str, Any]:
     """The prediction under recent duty, and in its place what the programme makes of it."""
     assumptions, fraction = state.assumptions(), state.fraction
     series = state.lives[-1].pooled(assumptions) if state.events else None
@@ -111,11 +111,13 @@ def _prediction(state: ClutchState, method: str, planned: ProgrammeIn) -> dict[s
     return recent | answer | {"counted_by": duty.severity.basis.value}
 
 
-def _planned_answer(programme: Programme, end: StatedEnd, series: Series, *, now: float, most: float) -> dict[str, Any]:
+def _planned_answer(
+    programme: DutyProgramme, end: StatedEnd, series: Series, *, now: float, most: float
+) -> dict[str, Any]:
     """When the life ends: as it was where that is past, else after as many cycles as ζ takes to get there, up to `most`."""
     draws = np.arange(end.ends.size) % programme.rates.shape[0]
     ahead = end.ends - float(series.scale.progress(now))
-    spread = Programme(cycles=programme.cycles, rates=programme.rates[draws])
+    spread = DutyProgramme(cycles=programme.cycles, rates=programme.rates[draws])
     with np.errstate(invalid="ignore"):
         left = np.where(ahead > 0.0, spread.cycles_until(np.maximum(ahead, 0.0)), series.scale.cycles(end.ends) - now)
     stated = weighted_quantiles(np.minimum(left, 10.0 * (most + HORIZON)), end.weight, QUANTILES).tolist()
@@ -134,7 +136,7 @@ def _planned_answer(programme: Programme, end: StatedEnd, series: Series, *, now
     }
 
 
-def _counted(state: ClutchState, severity: Severity, series: Series, planned: ProgrammeIn) -> "_Counted":
+def _counted(state: ClutchHistory, severity: Severity, series: Series, planned: ProgrammeIn) -> "_Counted":
     """How planned duty counts: as the record says; where that counts cycles and both the programme and the life's duty state
     energies, by its energy beside the mean of recent duty, in proportion."""
     plain = _Counted(severity=severity, scale=series.scale.severity, geometry=state.geometry)
@@ -161,14 +163,14 @@ class _Counted:
     geometry: Geometry
     assumed: bool = False
 
-    def programme(self, blocks: Blocks, cof: float, rng: np.random.Generator) -> Programme:
+    def programme(self, blocks: Blocks, cof: float, rng: np.random.Generator) -> DutyProgramme:
         """The programme, by draws of what it leaves open; what states no severity is as severe as recent duty."""
         rates = np.full((_PLANS, len(blocks)), self.scale.rate)
         for place, block in enumerate(blocks):
             work = self._work(block, cof, rng.permutation(_NORMALS))
             if work is not None and self.scale.reference is not None:
                 rates[:, place] = counted(work, self.scale.reference, self.severity.exponent)
-        return Programme(cycles=np.array([block.cycles for block in blocks]), rates=rates)
+        return DutyProgramme(cycles=np.array([block.cycles for block in blocks]), rates=rates)
 
     def notices(self, blocks: Blocks) -> list[Notice]:
         """A warning where what the programme plans cannot be counted."""

@@ -25,9 +25,9 @@ from service.clutch.quantities.measured import (
     chosen_life,
     quantity_named,
 )
-from service.clutch.recomputation import ClutchState
+from service.clutch.recomputation import ClutchHistory
 from service.clutch.tracking import CARRIED, predict_at
-from service.clutch.with_held import Evidence, measured_life, with_held
+from service.clutch.with_held import ClutchMeasurements, measured_life, with_held
 from service.errors import NotFoundError, unknown_clutch
 from storage import clutches, results
 from storage.engine.database import Database
@@ -92,7 +92,9 @@ def _disagreement(connection: Connection, clutch_id: str, at_cycles: float | Non
     return notice_items(filters_disagree({method: row.payload for method, row in stored.items() if row is not None}))
 
 
-def _predicted(state: ClutchState, method: str, pressure_bar: float | None, at_cycles: float | None) -> dict[str, Any]:
+def _predicted(
+    state: ClutchHistory, method: str, pressure_bar: float | None, at_cycles: float | None
+) -> dict[str, Any]:
     carried = (state.filters or {}).get(CARRIED[0])
     return predict_at(
         state.events,
@@ -106,7 +108,7 @@ def _predicted(state: ClutchState, method: str, pressure_bar: float | None, at_c
 
 
 def _with_held(
-    database: Database, state: ClutchState, method: str, pressure_bar: float | None, at_cycles: float | None
+    database: Database, state: ClutchHistory, method: str, pressure_bar: float | None, at_cycles: float | None
 ) -> dict[str, Any]:
     """Compute the prediction that counts the held runs too."""
     evidence = repository.evidence_for(database, state, repository.run_reader(database, state.clutch_id))
@@ -192,9 +194,9 @@ def life_by_criteria(
 
 
 def _by_criteria(
-    state: ClutchState,
+    state: ClutchHistory,
     chosen: ChosenLife,
-    evidence: Evidence,
+    evidence: ClutchMeasurements,
     *,
     method: str,
     quantity: str | None,

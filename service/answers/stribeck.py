@@ -9,7 +9,13 @@ import numpy as np
 from models.arrays import FloatArray
 from models.clutch import Geometry
 from models.friction.criteria import FEWEST_PRESSURES
-from models.friction.pressure_laws import LinearLaw, PressureLaws, fit_pressure_laws, law_covariances, over_pressure
+from models.friction.pressure_laws import (
+    LinearPressureLaw,
+    PressureLaws,
+    fit_pressure_laws,
+    law_covariances,
+    over_pressure,
+)
 from models.friction.stribeck import PARAMETER_NAMES, StribeckParameters, torque
 from models.prognosis.criteria import FEWEST_TESTS
 from service import repository
@@ -64,7 +70,7 @@ def _laws(laws: PressureLaws, covariances: Mapping[str, FloatArray]) -> dict[str
     items: dict[str, Any] = {}
     for name, (public, _) in PARAMETER_UNITS.items():
         law = getattr(laws, name)
-        if isinstance(law, LinearLaw):
+        if isinstance(law, LinearPressureLaw):
             items[public] = {"intercept": law.intercept, "slope_per_bar": law.slope * PASCALS_PER_BAR}
             in_bar = np.array([1.0, PASCALS_PER_BAR])
         else:

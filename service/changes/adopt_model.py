@@ -12,7 +12,7 @@ from sqlalchemy import Connection
 
 from service import repository
 from service.clutch.model_correction import extension_of
-from service.clutch.recomputation import Adoption, ClutchState, Results
+from service.clutch.recomputation import Adoption, ClutchHistory, Results
 from service.errors import NothingToAdoptError
 from storage import assumptions, changes, clutches, diagnoses, jobs
 from storage.assumptions import AdoptedRow
@@ -108,7 +108,7 @@ def _change(
             return
 
 
-def _computed(database: Database, clutch_id: str, adoption: Adoption | None) -> tuple[ClutchState, Results]:
+def _computed(database: Database, clutch_id: str, adoption: Adoption | None) -> tuple[ClutchHistory, Results]:
     """The clutch as it would be tracked; raises NothingToAdoptError where another life was diagnosed."""
     extension = None if adoption is None else adoption.extension
     with database.reading() as connection:

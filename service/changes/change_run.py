@@ -24,7 +24,7 @@ from service.clutch.model_correction import RunReader
 from service.clutch.plausibility.doubts import Judged, doubts_alone, doubts_together
 from service.clutch.recomputation import (
     Arrival,
-    ClutchState,
+    ClutchHistory,
     Levels,
     Receipt,
     Results,
@@ -71,7 +71,7 @@ class _Loaded:
 
     rows: tuple[RunRow, ...]
     events: tuple[Event, ...]
-    state: ClutchState
+    state: ClutchHistory
     levels: Levels
     receipts: Mapping[str, Receipt]
     withdrawn_from: str
@@ -88,7 +88,7 @@ class _Loaded:
         return event
 
     @property
-    def others(self) -> ClutchState:
+    def others(self) -> ClutchHistory:
         """The clutch's state without the runs that are being changed, whether they were accepted or held."""
         names = {event.run_id for event in self.events}
         events = tuple(event for event in self.state.events if event.run_id not in names)
@@ -273,7 +273,7 @@ def _judged(database: Database, loaded: _Loaded, cycles: float) -> RunRow:
     )
 
 
-def _together(others: ClutchState, incoming: Event | None, changed: Sequence[Event] = ()) -> Judged:
+def _together(others: ClutchHistory, incoming: Event | None, changed: Sequence[Event] = ()) -> Judged:
     corrected = others.extension is not None
     return doubts_together(others.events, others.held, incoming, others.geometry, corrected=corrected, changed=changed)
 

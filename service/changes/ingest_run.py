@@ -13,7 +13,7 @@ from typing import Any
 from sqlalchemy import Connection
 
 from models.clutch import Geometry
-from models.loops.loops import Loop
+from models.loops.loops import FrictionLoop
 from service import repository
 from service.clutch import timeline
 from service.clutch.analysis import LevelFit, analyse, loops_of
@@ -24,7 +24,7 @@ from service.clutch.notices import history_warnings, warned_again
 from service.clutch.plausibility.doubts import Judged, doubts_alone, doubts_together
 from service.clutch.recomputation import (
     Arrival,
-    ClutchState,
+    ClutchHistory,
     Levels,
     Results,
     Tracking,
@@ -37,7 +37,7 @@ from service.clutch.recomputation import (
     track,
     with_set_aside,
 )
-from service.clutch.with_held import Evidence, held_summary, needs_evidence, summarised
+from service.clutch.with_held import ClutchMeasurements, held_summary, needs_evidence, summarised
 from service.errors import ArchivedError, BusyError, ConflictError, Notice, TooLargeError
 from service.settings import CODE_VERSION
 from storage import changes, raw_columns, results, runs
@@ -158,7 +158,9 @@ def _repeat(stored: RunRow, run: IncomingRun) -> dict[str, Any]:
     return repository.receipt(stored) | {"duplicate": True}
 
 
-def _computed(database: Database, before: ClutchState, arrival: Arrival, read_with: tuple[Geometry, float]) -> _Outcome:
+def _computed(
+    database: Database, before: ClutchHistory, arrival: Arrival, read_with: tuple[Geometry, float]
+) -> _Outcome:
     """The results of the run in the clutch's history `before` it; it was read with a geometry and a filter.
 
     Accepted, it is one more event. Doubted, it is held, and only the summary speaks of it. Where it speaks for or
@@ -217,12 +219,12 @@ def _computed(database: Database, before: ClutchState, arrival: Arrival, read_wi
 
 
 def _receipt(
-    before: ClutchState, state: ClutchState, event: timeline.Event, arrival: Arrival, levels: Levels
+    before: ClutchHistory, state: ClutchHistory, event: timeline.Event, arrival: Arrival, levels: Levels
 ) -> tuple[dict[str, Any], dict[str, str | None]]:
     """The run's receipt, and by which stationary test the loops of each dynamic one were evaluated: of those before, and of
     the run itself."""
     evaluated = timeline.stationary_tests_of(before.events)
-    loops: Sequence[Loop] = ()
+    loops: Sequence[FrictionLoop] = ()
     if event.kind == timeline.DYNAMIC:
         test = evaluated[event.run_id] = timeline.stationary_tests_of(state.events)[event.run_id]
         curves = [] if test is None else levels.get(test, [])
@@ -240,13 +242,13 @@ def _receipt(
 
 def _one_step(
     database: Database,
-    state: ClutchState,
+    state: ClutchHistory,
     event: timeline.Event,
     levels: Levels,
     answer: dict[str, Any],
     arrival: Arrival,
     evaluated: Mapping[str, str | None],
-) -> tuple[ClutchState, Results]:
+) -> tuple[ClutchHistory, Results]:
     """What changes with a run that leaves what was measured before as it is: the filters carried on, if they may be."""
     corrected: dict[str, timeline.Corrected] = {}
     if state.extension is not None and event is state.events[-1]:
@@ -271,13 +273,13 @@ def _one_step(
     return state, Results(corrected=corrected, receipts=changed, tracking=tracking)
 
 
-def _evidence(database: Database, state: ClutchState, arrival: Arrival, answer: dict[str, Any]) -> Evidence:
+def _evidence(database: Database, state: ClutchHistory, arrival: Arrival, answer: dict[str, Any]) -> ClutchMeasurements:
     name = arrival.run.run_id
     with database.reading() as connection:
         stored = repository.evidence(connection, state.clutch_id)
     reader = reader_with(repository.run_reader(database, state.clutch_id), arrival)
     engagement = stored_engagement(answer, arrival.analysis.details_to_store(arrival.run))
-    return Evidence(
+    return ClutchMeasurements(
         levels={**stored.levels, name: arrival.analysis.fits},
         receipts={**stored.receipts, name: answer},
         engagements={**stored.engagements, **({} if engagement is None else {name: engagement})},
@@ -289,7 +291,7 @@ def _own_levels(arrival: Arrival) -> dict[str, Sequence[LevelFit]]:
     return {arrival.run.run_id: arrival.analysis.fits} if arrival.analysis.fits else {}
 
 
-def _levels(database: Database, state: ClutchState, event: timeline.Event, arrival: Arrival) -> Levels:
+def _levels(database: Database, state: ClutchHistory, event: timeline.Event, arrival: Arrival) -> Levels:
     """The levels of all tests where they are needed, else those of the run alone."""
     if event.kind != timeline.DYNAMIC and event is state.events[-1] and not event.rebuild and state.adoption is None:
         return _own_levels(arrival)
@@ -353,7 +355,7 @@ def _event_of(arrival: Arrival) -> timeline.Event:
     )
 
 
-def _changes_the_past(before: ClutchState, ordered: Sequence[timeline.Event], event: timeline.Event) -> bool:
+def _changes_the_past(before: ClutchHistory, ordered: Sequence[timeline.Event], event: timeline.Event) -> bool:
     """Whether predictions of earlier or later tests no longer hold.
 
     A late test or rebuild may make another test the reference, and with it the protocol of all means; under an adopted

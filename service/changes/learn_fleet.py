@@ -11,7 +11,7 @@ from typing import TypeAlias
 import numpy as np
 
 from models.prognosis.criteria import FEWEST_CLUTCHES, FEWEST_TESTS_TO_LEARN
-from models.prognosis.ended_lives import EndedLife, declared_end, ended_life, new_and_laws, representative
+from models.prognosis.ended_lives import ObservedLife, declared_end, ended_life, new_and_laws, representative
 from models.prognosis.first_passage import horizon_at
 from models.prognosis.fleet import Taught, population, taught
 from models.prognosis.scoring import measured_end
@@ -19,11 +19,11 @@ from service import repository
 from service.clutch.assumptions import ALL_PRESSURES, Assumptions, may_be_of
 from service.clutch.criteria import MAX_ATTEMPTS
 from service.clutch.notices import warned_again
-from service.clutch.recomputation import ClutchState, Receipt, Results, track
+from service.clutch.recomputation import ClutchHistory, Receipt, Results, track
 from service.clutch.timeline import WORN, Life
 from service.clutch.tracking import CARRIED, mean_offset_of
-from service.clutch.with_held import Evidence, needs_evidence, summarised
-from service.jobs.change import Task
+from service.clutch.with_held import ClutchMeasurements, needs_evidence, summarised
+from service.jobs.change import ChangeTask
 from service.jobs.executor import Ended, Ending, Executor, in_rounds
 from service.settings import CODE_VERSION
 from storage import assumptions, clutches, jobs, results
@@ -41,7 +41,7 @@ class Lesson:
     """What a life has taught: of eq. 6's coefficients, and, where it has ended, of its end; ζ in standard cycles."""
 
     taught: Taught
-    ended: EndedLife | None
+    ended: ObservedLife | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -77,7 +77,7 @@ class Refreshed:
 
 
 #: What a clutch's tracks are computed again from: its state, its receipts, and what else its summary follows from.
-_Tracked: TypeAlias = tuple[ClutchState, Mapping[str, Receipt], Evidence | None]
+_Tracked: TypeAlias = tuple[ClutchHistory, Mapping[str, Receipt], ClutchMeasurements | None]
 
 
 def refresh(
@@ -167,7 +167,7 @@ def _fleets(
 
 
 def as_job(
-    database: Database, task: Task, *, say: Callable[[Json], None], executor: Executor
+    database: Database, task: ChangeTask, *, say: Callable[[Json], None], executor: Executor
 ) -> tuple[dict[str, int], dict[str, str]]:
     """Refresh a fleet's prior, or all of them, saying how far it has come.
 
@@ -200,18 +200,18 @@ def as_job(
     return {"kinds": len(done.kinds), "changed": len(done.changed)}, dict(done.left)
 
 
-def _ask_for_the_rest(database: Database, task: Task) -> None:
+def _ask_for_the_rest(database: Database, task: ChangeTask) -> None:
     kind = None if task.of is None else to_object(task.of)
     with database.writing(of=jobs.FLEET_REFRESH) as connection:
         repository.ask_fleet_refresh(connection, kind, by=task.by, at=task.at, learned=True)
 
 
-def _state(database: Database, clutch_id: str) -> ClutchState:
+def _state(database: Database, clutch_id: str) -> ClutchHistory:
     with database.reading() as connection:
         return repository.state(connection, clutch_id)
 
 
-def lessons_of(state: ClutchState) -> tuple[Json, list[Lesson]]:
+def lessons_of(state: ClutchHistory) -> tuple[Json, list[Lesson]]:
     """A clutch's kind, and what each of its lives teaches."""
     assumptions = state.assumptions()
     lessons = [_lesson(life, assumptions, state.fraction) for life in state.lives]

@@ -7,7 +7,7 @@ from service import repository
 from service.clutch.criteria import MAX_ATTEMPTS
 from service.clutch.recomputation import Results
 from service.errors import BusyError, ServiceError
-from service.jobs.change import Task
+from service.jobs.change import ChangeTask
 from service.jobs.executor import Ended, Ending, Executor, WorkerLostError, in_rounds
 from service.repository import Recorded
 from storage import clutches
@@ -47,7 +47,7 @@ def replay(database: Database, clutch_ids: Sequence[str], executor: Executor) ->
 
 
 def as_job(
-    database: Database, task: Task, *, say: Callable[[Json], None], executor: Executor
+    database: Database, task: ChangeTask, *, say: Callable[[Json], None], executor: Executor
 ) -> tuple[dict[str, int], dict[str, str]]:
     """Replay a clutch, None: all of them, saying how far it has come.
 

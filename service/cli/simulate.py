@@ -11,7 +11,7 @@ from service.cli.options import EX_USAGE, Seed, err, errors_in_a_line, fail, out
 from service.runs import manifest
 
 if TYPE_CHECKING:
-    from models.rig.programme import Programme
+    from models.rig.programme import RigProgramme
     from models.rig.simulated_runs import SimulatedRun
     from service.runs.record_writer import RecordFormat
 
@@ -179,9 +179,9 @@ def _run_plan(folder: Path, plan: Path, alternative: int) -> None:
 
 def _programme(
     raw_rate: float | None, dynamic: bool, ageing: str, frequencies: list[float], pressures: list[float]
-) -> "Programme":
+) -> "RigProgramme":
     """The programme of fig. 2 with these options; frequencies in Hz and pressures in bar, the reference's without any."""
-    from models.rig.programme import Ageing, Programme  # start-up time
+    from models.rig.programme import Ageing, RigProgramme  # start-up time
     from models.rig.sampled import PROTOCOL, DynamicTest, RawTest  # start-up time
     from service.channels import PASCALS_PER_BAR  # start-up time
 
@@ -189,7 +189,7 @@ def _programme(
     usual = DynamicTest(pressures=levels)
     swings = [replace(usual, frequency=f, duration=max(usual.duration, 1.5 / f)) for f in dict.fromkeys(frequencies)]
     loops = (swings or [usual]) if dynamic else []
-    return Programme(
+    return RigProgramme(
         dynamic=loops[0] if loops else None,
         further=tuple(loops[1:]),
         raw=None if raw_rate is None else RawTest(rate=raw_rate, pressures=levels),

@@ -12,10 +12,10 @@ import numpy as np
 
 from models.arrays import FloatArray
 from models.clutch import Geometry
-from models.friction.identification import FitStatus, StribeckFit, fit_curves, mean_torques
+from models.friction.identification import StribeckFit, StribeckFitStatus, fit_curves, mean_torques
 from models.friction.speed_protocol import protocol_speeds
 from models.loops.lag_fit import StationaryCurve
-from models.loops.loops import Loop, evaluate_loops
+from models.loops.loops import FrictionLoop, evaluate_loops
 from models.records.criteria import UNLOADED
 from models.records.plateaus import cut_plateaus
 from models.records.runs import Plateaus, curves_by_pressure, loaded
@@ -110,7 +110,7 @@ def levels_of(plateaus: Plateaus, geometry: Geometry) -> tuple[LevelFit, ...]:
 
 def loops_of(
     channels: Mapping[str, FloatArray], geometry: Geometry, torque_filter: float, levels: Sequence[LevelFit]
-) -> tuple[Loop, ...]:
+) -> tuple[FrictionLoop, ...]:
     """The friction loops of a dynamic test, with the lag behind the curves of its stationary test and beyond the torque
     channel's own, of `torque_filter` [s]. What a curve's covariance leaves open makes the lag less certain, or unresolved.
     """
@@ -191,7 +191,7 @@ def _unloaded(plateaus: Plateaus, under_load: Plateaus | None) -> list[Notice]:
 
 def _fit_warnings(fit: StribeckFit) -> list[Notice]:
     at = f"at {fit.pressure / PASCALS_PER_BAR:g} bar"
-    if fit.status is FitStatus.UNDETERMINED:
+    if fit.status is StribeckFitStatus.UNDETERMINED:
         return [Notice(code="undetermined", message=f"{at}: {fit.message}")]
     poor = fit.rmse > POOR_FIT * float(fit.parameters.static_torque)
     if not fit.acceptable and fit.mse_percent is not None and poor:

@@ -11,11 +11,11 @@ import numpy as np
 
 from models.arrays import FloatArray
 from models.degradation.severity import IDENTITY, Block, Severity, SeverityBasis, SeverityMap, severity_map
-from models.prognosis.ended_lives import EndedLife
+from models.prognosis.ended_lives import ObservedLife
 from models.prognosis.fleet import FleetPrior
 from models.tracking.measurement import Measurement
-from models.tracking.posterior import Posterior
-from models.tracking.prior import Prior, weak
+from models.tracking.posterior import TrackPosterior
+from models.tracking.prior import TrackPrior, weak
 from service.api.clutch import ClutchIn
 
 MEAN_COF = "mean_cof"
@@ -47,7 +47,7 @@ class LearnedPrior:
     """The prior that a fleet has taught (None: the weak one alone), its lives that have ended, and its public name."""
 
     fleet: FleetPrior | None = None
-    ended: tuple[EndedLife, ...] = ()
+    ended: tuple[ObservedLife, ...] = ()
     name: Mapping[str, Any] = field(default_factory=lambda: {"name": WEAK, "version": None, "clutches": 0})
 
 
@@ -88,21 +88,21 @@ class Assumptions:
         since = [] if self.counts_cycles else [block.since(origin) for block in blocks if block.end > origin]
         return Scale(origin=origin, severity=severity_map(self.severity, since))
 
-    def priors(self, quantity: str, first: Measurement, scale: Scale) -> dict[str, Prior]:
+    def priors(self, quantity: str, first: Measurement, scale: Scale) -> dict[str, TrackPrior]:
         """The priors of a series by name; its first measurement gives their size."""
         fleet = self.prior.fleet
         if fleet is None or quantity != MEAN_COF:
             return {WEAK: weak(first, falling=quantity == MEAN_COF)}
         return {WEAK: weak(first, falling=True), FLEET: fleet.in_unit(scale.severity.unit).prior_for(first)}
 
-    def pooled(self, posteriors: Mapping[str, Posterior], first: Measurement, scale: Scale) -> Posterior:
+    def pooled(self, posteriors: Mapping[str, TrackPosterior], first: Measurement, scale: Scale) -> TrackPosterior:
         """The posteriors under each of `priors` as one, weighted by their evidence."""
         fleet = self.prior.fleet
         if fleet is None or FLEET not in posteriors:
             return posteriors[WEAK]
         return fleet.in_unit(scale.severity.unit).together(posteriors[WEAK], posteriors[FLEET], first)
 
-    def ended(self, series_of: tuple[str, float], fraction: float, scale: Scale) -> list[EndedLife]:
+    def ended(self, series_of: tuple[str, float], fraction: float, scale: Scale) -> list[ObservedLife]:
         """The fleet's ended lives by the same criterion: of mean COF over all pressures, none of another quantity."""
         if series_of != (MEAN_COF, ALL_PRESSURES):
             return []

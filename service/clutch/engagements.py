@@ -13,14 +13,14 @@ import numpy as np
 from models.arrays import FloatArray
 from models.clutch import Geometry
 from models.engagements.comparison import Comparison, SpeedCourse, compared, reference_of, same_duty
-from models.engagements.measured import MeasuredEngagement, measured_engagement
-from models.engagements.slip import Estimate, Refusal
+from models.engagements.measured import EngagementIndicators, measured_engagement
+from models.engagements.slip import Refusal, ValueWithError
 from service.channels import CHANNELS, PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM
 from service.clutch.incoming_run import IncomingRun, sampled_record
 from service.errors import Notice
 
 #: The indicators of a run's engagement, or why it has none.
-Engagement: TypeAlias = MeasuredEngagement | Refusal
+Engagement: TypeAlias = EngagementIndicators | Refusal
 
 #: Kinds of runs that may carry the record of an engagement.
 DUTY_KINDS = ("duty_cycles", "run_in")
@@ -99,12 +99,12 @@ def engagement_item(engagement: Engagement) -> dict[str, Any]:
 
 
 def _indicator_items(
-    found: MeasuredEngagement | Comparison, indicators: Mapping[str, Indicator]
+    found: EngagementIndicators | Comparison, indicators: Mapping[str, Indicator]
 ) -> dict[str, dict[str, float] | None]:
     """Each indicator with its standard error in the public unit; null where it is not determined."""
     items: dict[str, dict[str, float] | None] = {}
     for name, indicator in indicators.items():
-        estimate: Estimate | None = getattr(found, indicator.field)
+        estimate: ValueWithError | None = getattr(found, indicator.field)
         factor = indicator.factor
         items[name] = None if estimate is None else {"value": estimate.value / factor, "sd": estimate.sd / factor}
     return items
@@ -112,7 +112,7 @@ def _indicator_items(
 
 def course_item(engagement: Engagement | None) -> dict[str, Any]:
     """What is kept of the sliding speed beside a run's channels; empty for a run without an engagement."""
-    if not isinstance(engagement, MeasuredEngagement):
+    if not isinstance(engagement, EngagementIndicators):
         return {}
     course = engagement.course
     return {
@@ -164,7 +164,7 @@ def stored_engagement(receipt: Mapping[str, Any], details: Mapping[str, Any]) ->
         return StoredEngagement(receipt=receipt, course=None)
     kept = details[COURSE]
     course = SpeedCourse(
-        duration=Estimate(value=kept["duration_s"], sd=kept["duration_sd_s"]),
+        duration=ValueWithError(value=kept["duration_s"], sd=kept["duration_sd_s"]),
         speed=np.array(kept["speed_rpm"]) * RADIANS_PER_SECOND_PER_RPM,
         noise=kept["noise_rpm"] * RADIANS_PER_SECOND_PER_RPM,
     )

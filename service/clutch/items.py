@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from models.friction.identification import StribeckFit
-from models.loops.loops import Loop
+from models.loops.loops import FrictionLoop
 from models.prognosis.criteria import HORIZON, QUANTILES
 from models.prognosis.first_passage import horizon_at
 from service.channels import bar, whole
@@ -36,7 +36,7 @@ def receipt(
     *,
     received_at: str,
     cofs: ByPressure | None = None,
-    loops: Sequence[Loop] = (),
+    loops: Sequence[FrictionLoop] = (),
 ) -> dict[str, Any]:
     """The receipt of a run by itself; its mean COFs and loops where they are known already."""
     return {
@@ -94,7 +94,7 @@ def _fit_item(fit: StribeckFit, cof: Value | tuple[None, None]) -> dict[str, Any
     }
 
 
-def loop_items(loops: Sequence[Loop]) -> list[dict[str, Any]]:
+def loop_items(loops: Sequence[FrictionLoop]) -> list[dict[str, Any]]:
     return [
         {
             "pressure_bar": bar(loop.pressure),

@@ -5,14 +5,14 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from models.prognosis.back_cast import BackCast
-from models.prognosis.course_shares import CourseName, CourseShare
+from models.prognosis.course_shares import CourseName, CourseProbability
 from models.prognosis.criteria import HORIZON
 from models.prognosis.stated_end import NewLater
 from models.tracking.criteria import FAR
 from models.tracking.innovation import last_innovation
 from models.tracking.measurement import Measurement
-from models.tracking.posterior import Posterior
-from models.tracking.prior import Prior
+from models.tracking.posterior import TrackPosterior
+from models.tracking.prior import TrackPrior
 from service.channels import ZERO_CELSIUS, bar
 from service.clutch.criteria import EQ_6_DOUBTED, OTHER_OIL
 from service.clutch.items import ENDED, INSUFFICIENT, notice_items, share_of_way
@@ -27,7 +27,7 @@ LATE, OTHER_PRESSURES, OTHER_OIL_TEMPERATURE = "late_arrival", "other_pressures"
 OF_HISTORY = LATE, OTHER_PRESSURES, OTHER_OIL_TEMPERATURE, OFF_TRACK
 
 
-def not_eq_6(courses: Sequence[CourseShare]) -> list[Notice]:
+def not_eq_6(courses: Sequence[CourseProbability]) -> list[Notice]:
     """The warning of a course that eq. 6 cannot take; `courses`: the most probable first."""
     if any(share.name is CourseName.EQ_6 and share.probability >= EQ_6_DOUBTED for share in courses):
         return []
@@ -91,7 +91,7 @@ def interval_in_words(remaining: Mapping[str, float | None]) -> str:
     return f"{median:,.0f} (90 %: {low:,.0f} to {upper})"
 
 
-def off_track(posterior: Posterior, measurements: Sequence[Measurement], prior: Prior) -> list[Notice]:
+def off_track(posterior: TrackPosterior, measurements: Sequence[Measurement], prior: TrackPrior) -> list[Notice]:
     """The warning of a last test that lies far off what the tests before it predict, and no event lies between."""
     deviations = last_innovation(posterior, measurements, prior)
     if deviations is None or not abs(deviations) > FAR:

@@ -1,6 +1,6 @@
 """The state of a clutch as one value, and all results that are computed from it; nothing here uses a database.
 
-A change loads a `ClutchState`, computes `Results` with the functions below, and stores them in one short transaction that
+A change loads a `ClutchHistory`, computes `Results` with the functions below, and stores them in one short transaction that
 checks that the state's revision is still the newest. An `Arrival` is a run as it comes in, among the stored ones. Where
 the filters may go one step on from their stored states, and where a life is tracked again, is decided here.
 """
@@ -26,7 +26,7 @@ from service.clutch.items import fit_items, loop_items
 from service.clutch.model_correction import RunReader, corrected_cofs, model_in_force
 from service.clutch.notices import OF_HISTORY, OFF_TRACK, warned_again
 from service.clutch.plausibility.doubts import Judged, levelled
-from service.clutch.tracking import CARRIED, Prediction, States, follow
+from service.clutch.tracking import CARRIED, States, TrackPrediction, follow
 from service.errors import Notice
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ def newest_adoption(adoptions: Iterable[Adoption | None], lives: Collection[str]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ClutchState:
+class ClutchHistory:
     """What the next run's results depend on, at one revision.
 
     `events` are all accepted runs in the order of the history, mean COF as the model in force corrects it; `held` those that
@@ -121,7 +121,7 @@ class Tracking:
     """Predictions after events, the filters' states after the last, and by run_id the warnings of the predictions right
     after tests; `again` where all that was predicted before is replaced."""
 
-    predictions: tuple[Prediction, ...] = ()
+    predictions: tuple[TrackPrediction, ...] = ()
     filters: States = field(default_factory=dict)
     warnings: Mapping[str, list[dict[str, str]]] = field(default_factory=dict)
     again: bool = True
@@ -147,13 +147,13 @@ class Results:
 
 
 def computed_again(
-    state: ClutchState,
+    state: ClutchHistory,
     levels: Levels,
     receipts: Mapping[str, Receipt],
     reader: RunReader,
     *,
     evaluated: Mapping[str, str | None],
-) -> tuple[ClutchState, Results]:
+) -> tuple[ClutchHistory, Results]:
     """Mean COFs over the protocol of each life, freed of the artefacts of the model in force, and all tracked again.
 
     `levels` and `receipts` are those of all runs; `evaluated` as `loops_again` takes it. Returns the state with its mean
@@ -176,8 +176,8 @@ def computed_again(
 
 
 def with_cofs(
-    state: ClutchState, levels: Levels, reader: RunReader
-) -> tuple[ClutchState, dict[str, timeline.ByPressure], dict[str, timeline.Corrected]]:
+    state: ClutchHistory, levels: Levels, reader: RunReader
+) -> tuple[ClutchHistory, dict[str, timeline.ByPressure], dict[str, timeline.Corrected]]:
     """The state with the mean COFs of its events and the new levels that these show, the COFs that the fits give by run_id,
     and those that the model in force corrects; arguments as of `computed_again`."""
     cofs = _cofs_of_tests(state.lives, levels, state.geometry)
@@ -193,7 +193,7 @@ def with_cofs(
     return replace(plain, events=events), cofs, corrected
 
 
-def cofs_among(state: ClutchState, event: timeline.Event, levels: Sequence[LevelFit]) -> timeline.ByPressure:
+def cofs_among(state: ClutchHistory, event: timeline.Event, levels: Sequence[LevelFit]) -> timeline.ByPressure:
     """A run's mean COFs as they are, or would be, in the history: over the protocol of its life's first stationary test,
     which may be itself."""
     life = timeline.life_with(timeline.order([*state.events, event]), event)
@@ -202,7 +202,7 @@ def cofs_among(state: ClutchState, event: timeline.Event, levels: Sequence[Level
 
 def with_set_aside(
     computed: Results,
-    state: ClutchState,
+    state: ClutchHistory,
     events: Iterable[timeline.Event],
     levels: Levels,
     receipts: Mapping[str, Receipt],
@@ -238,7 +238,7 @@ def _cofs_of_tests(
 
 
 def corrected_newest(
-    state: ClutchState, newest: timeline.Event, test: StationaryRun | None, reader: RunReader
+    state: ClutchHistory, newest: timeline.Event, test: StationaryRun | None, reader: RunReader
 ) -> timeline.Corrected | None:
     """The mean COFs of the test that comes last, freed of artefacts of the model in force; None where nothing changes."""
     if state.extension is None or newest.speed_range is None or test is None:
@@ -248,7 +248,7 @@ def corrected_newest(
     return corrected_cofs(state.extension, state.record, life, runs, [test]).get(newest.run_id)
 
 
-def track(state: ClutchState, *, newest: timeline.Event | None = None) -> Tracking:
+def track(state: ClutchHistory, *, newest: timeline.Event | None = None) -> Tracking:
     """Track what the history asks for: one step where `newest` comes last and the filters' states serve, else all of it."""
     if not state.events:
         return Tracking()
@@ -259,7 +259,7 @@ def track(state: ClutchState, *, newest: timeline.Event | None = None) -> Tracki
     walks: list[tuple[timeline.Life, timeline.Series, States, int]] = [(lives[-1], last, carried or {}, first)]
     if carried is None:
         walks[:0] = [(life, life.pooled(assumptions), {}, 0) for life in lives[:-1]]
-    predictions: dict[tuple[float, str], Prediction] = {}
+    predictions: dict[tuple[float, str], TrackPrediction] = {}
     filters: States = {}
     warnings: dict[str, list[dict[str, str]]] = {}
     for life, full_life, start, first_event in walks:
@@ -275,7 +275,9 @@ def track(state: ClutchState, *, newest: timeline.Event | None = None) -> Tracki
     return Tracking(predictions=tuple(predictions.values()), filters=filters, warnings=warnings, again=carried is None)
 
 
-def _carried(state: ClutchState, life: timeline.Life, whole: timeline.Series, newest: timeline.Event) -> States | None:
+def _carried(
+    state: ClutchHistory, life: timeline.Life, whole: timeline.Series, newest: timeline.Event
+) -> States | None:
     """The stored states from before `newest`, or None where one step on from them would not give the same answer."""
     last = life.events[-1]
     is_test = newest.speed_range is not None
@@ -291,7 +293,7 @@ def _carried(state: ClutchState, life: timeline.Life, whole: timeline.Series, ne
 
 
 def loops_again(
-    state: ClutchState, levels: Levels, reader: RunReader, evaluated: Mapping[str, str | None]
+    state: ClutchHistory, levels: Levels, reader: RunReader, evaluated: Mapping[str, str | None]
 ) -> dict[str, list[dict[str, Any]]]:
     """run_id -> loops of the dynamic tests that have another stationary test than that which they were `evaluated` against,
     by run_id; of those that are not there, too."""

@@ -23,7 +23,7 @@ _GRID = Grid()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SeverityEstimate:
+class SeverityPosterior:
     """The probability [k] of each of SEVERITY_EXPONENTS, of the work that `basis` names."""
 
     basis: SeverityBasis
@@ -57,7 +57,7 @@ class SeverityEstimate:
         return [Notice(code="severity_exponent", message=message)]
 
 
-def severity_estimate(life: Life, assumptions: Assumptions) -> SeverityEstimate | None:
+def severity_estimate(life: Life, assumptions: Assumptions) -> SeverityPosterior | None:
     """The estimate of a life, under the assumptions that it is tracked under but for their severity.
 
     None where its duty states no work or hardly varies, or where it has too few tests: then nothing tells the exponents
@@ -78,4 +78,4 @@ def severity_estimate(life: Life, assumptions: Assumptions) -> SeverityEstimate 
         prior = under.priors(series.quantity, series.measurements[0], series.scale)[WEAK]
         log_evidence.append(_GRID.laid(_GRID.from_history(prior, series.measurements)).log_evidence)
     share = np.exp(np.array(log_evidence) - max(log_evidence))
-    return SeverityEstimate(basis=basis, probability=share / share.sum())
+    return SeverityPosterior(basis=basis, probability=share / share.sum())

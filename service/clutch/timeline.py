@@ -21,7 +21,7 @@ from models.degradation.severity import Block
 from models.friction.speed_protocol import protocol_speeds
 from models.records.criteria import LEVEL_GAP, LEVEL_GAP_SHARE
 from models.tracking.measurement import Measurement
-from models.tracking.prior import Prior
+from models.tracking.prior import TrackPrior
 from service.channels import RADIANS_PER_SECOND_PER_RPM
 from service.clutch.analysis import Value
 from service.clutch.assumptions import ALL_PRESSURES, MEAN_COF, Assumptions, Scale
@@ -140,7 +140,7 @@ class Series:
         """How many measurements there were when `event` had happened."""
         return sum(1 for index in self.events if index <= event)
 
-    def priors(self, first: Measurement) -> Mapping[str, Prior]:
+    def priors(self, first: Measurement) -> Mapping[str, TrackPrior]:
         """The priors that it is tracked under where `first` is its first measurement, by name."""
         return self.assumptions.priors(self.quantity, first, self.scale)
 

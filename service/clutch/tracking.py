@@ -23,8 +23,8 @@ from models.tracking.filters.grid import Grid, GridState
 from models.tracking.filters.particle import Particle, ParticleState
 from models.tracking.filters.ukf import Ukf, UkfState
 from models.tracking.measurement import Measurement
-from models.tracking.posterior import Posterior, Tracker, mixture
-from models.tracking.prior import Prior
+from models.tracking.posterior import Tracker, TrackPosterior, mixture
+from models.tracking.prior import TrackPrior
 from service.channels import PASCALS_PER_BAR, bar, whole
 from service.clutch import items, notices
 from service.clutch.assumptions import ALL_PRESSURES, WEAK, Assumptions
@@ -47,7 +47,7 @@ _BACK_CAST = "back_cast"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Prediction:
+class TrackPrediction:
     """The prediction at `cycles` by one method, in the public shape."""
 
     cycles: float
@@ -64,7 +64,7 @@ class Tracked:
     runs: int
     states: Mapping[str, FilterState]
     back_cast: BackCast
-    sample: Posterior | None = None
+    sample: TrackPosterior | None = None
 
     def to_arrays(self) -> dict[str, FloatArray]:
         """Named arrays: those of a state after the prior that it started from, as in `weak/mean`."""
@@ -92,7 +92,7 @@ States = Mapping[str, Tracked]
 
 def follow(
     life: Life, whole_series: Series, fraction: float, states: States, *, first_event: int = 0
-) -> Iterator[tuple[States, list[Prediction]]]:
+) -> Iterator[tuple[States, list[TrackPrediction]]]:
     """Walk a life's events from `first_event` on; after each, the states by method and the predictions of the series.
 
     `whole_series` is that of all its events, `states` are those before `first_event`. A life with too few tests yields
@@ -109,7 +109,7 @@ def follow(
         predictions = []
         for method in CARRIED:
             payload = predict(method, series, states.get(method), cycles, fraction, tests=tests)
-            predictions.append(Prediction(cycles=cycles, method=method, payload=items.ended(payload, so_far.end)))
+            predictions.append(TrackPrediction(cycles=cycles, method=method, payload=items.ended(payload, so_far.end)))
         yield states, predictions
 
 
@@ -146,7 +146,7 @@ def advance(
     return tracked
 
 
-def _branches(series: Series) -> dict[str, tuple[Prior, tuple[Measurement, ...]]]:
+def _branches(series: Series) -> dict[str, tuple[TrackPrior, tuple[Measurement, ...]]]:
     """What a filter is run under, by name: every prior, with every draw of the series' measurements."""
     return {
         _branch(prior_name, draw, series): (prior, measurements)
@@ -168,7 +168,7 @@ def _tracker(method: str, branches: int) -> Tracker[Any]:
     return replace(tracker, particles=max(tracker.particles // branches, min(tracker.particles, FEWEST_PARTICLES)))
 
 
-def _continues(tracked: Tracked, branches: Mapping[str, tuple[Prior, tuple[Measurement, ...]]]) -> bool:
+def _continues(tracked: Tracked, branches: Mapping[str, tuple[TrackPrior, tuple[Measurement, ...]]]) -> bool:
     """Whether the states are those of the branches' first measurements under their priors."""
     if tracked.states.keys() != branches.keys():
         return False
@@ -185,7 +185,7 @@ def _continues(tracked: Tracked, branches: Mapping[str, tuple[Prior, tuple[Measu
     return True
 
 
-def drawn(method: str, series: Series, tracked: Tracked) -> Posterior:
+def drawn(method: str, series: Series, tracked: Tracked) -> TrackPosterior:
     """A weighted sample of the coefficients after `tracked.runs` measurements; the same each time, and drawn once.
 
     Its size is shared among the priors and the draws of the model in force: so a prediction costs about the same.
@@ -285,7 +285,7 @@ def predict(
     }
 
 
-def _off_track(sample: Posterior, series: Series, runs: int) -> list[Notice]:
+def _off_track(sample: TrackPosterior, series: Series, runs: int) -> list[Notice]:
     """The warning of a last test that lies far off under every draw of the model in force, by the first of them."""
     first: list[Notice] = []
     for draw, (_, measurements) in enumerate(series.weighted):
@@ -298,7 +298,7 @@ def _off_track(sample: Posterior, series: Series, runs: int) -> list[Notice]:
 
 
 def end_of_life(
-    sample: Posterior, series: Series, tracked: Tracked, cycles: float, fraction: float, horizon: float
+    sample: TrackPosterior, series: Series, tracked: Tracked, cycles: float, fraction: float, horizon: float
 ) -> StatedEnd:
     """The end of life ζ as it is stated at `cycles`, up to a horizon in ζ."""
     as_of = float(series.scale.progress(cycles))

@@ -13,14 +13,14 @@ from service.clutch.items import ended
 from service.clutch.model_correction import RunReader
 from service.clutch.quantities.ends import CriterionEnd, criteria_answer, criterion_end
 from service.clutch.quantities.measured import ChosenLife, MeasuredLife, chosen_life
-from service.clutch.recomputation import ClutchState, Levels, Receipt, Tracking, with_cofs
+from service.clutch.recomputation import ClutchHistory, Levels, Receipt, Tracking, with_cofs
 from service.clutch.timeline import Event, lives_of, moment_at, order, pace_of
 from service.clutch.tracking import CARRIED, States, predict_at
 from service.errors import NotFoundError
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Evidence:
+class ClutchMeasurements:
     """What was measured of a clutch by run_id, of its held runs too."""
 
     levels: Levels
@@ -29,12 +29,12 @@ class Evidence:
     reader: RunReader | None = None
 
 
-def needs_evidence(state: ClutchState) -> bool:
+def needs_evidence(state: ClutchHistory) -> bool:
     """Whether a clutch's summary follows from more than its tracks."""
     return bool(state.held or state.record.end_of_life.criteria)
 
 
-def summarised(state: ClutchState, tracking: Tracking, evidence: Evidence | None) -> dict[str, Any]:
+def summarised(state: ClutchHistory, tracking: Tracking, evidence: ClutchMeasurements | None) -> dict[str, Any]:
     """The summary of a clutch that was tracked; `evidence` is needed where `needs_evidence` says so."""
     if not state.events:
         return held_summary(state, {}, evidence)
@@ -60,7 +60,7 @@ def summarised(state: ClutchState, tracking: Tracking, evidence: Evidence | None
     return summary | held_summary(state, tracking.filters, evidence)
 
 
-def held_summary(state: ClutchState, filters: States, evidence: Evidence | None) -> dict[str, Any]:
+def held_summary(state: ClutchHistory, filters: States, evidence: ClutchMeasurements | None) -> dict[str, Any]:
     """What a summary says of the held runs: how many there are, and by each filter what would be predicted with them."""
     if not state.held or evidence is None:
         return {"held": len(state.held), "with_held": None}
@@ -71,7 +71,7 @@ def held_summary(state: ClutchState, filters: States, evidence: Evidence | None)
     }
 
 
-def with_held(state: ClutchState, evidence: Evidence) -> ClutchState:
+def with_held(state: ClutchHistory, evidence: ClutchMeasurements) -> ClutchHistory:
     """The clutch as it would be were its held runs accepted."""
     state_with_held = replace(state, events=order([*state.events, *state.held]), held=())
     if evidence.reader is None:
@@ -79,7 +79,7 @@ def with_held(state: ClutchState, evidence: Evidence) -> ClutchState:
     return with_cofs(state_with_held, evidence.levels, evidence.reader)[0]
 
 
-def outlook(state: ClutchState, method: str, evidence: Evidence, filters: States) -> dict[str, Any]:
+def outlook(state: ClutchHistory, method: str, evidence: ClutchMeasurements, filters: States) -> dict[str, Any]:
     """The remaining life by a filter and the clutch's own criteria; `filters` of other measurements are not carried on."""
     payload = predict_at(state.events, state.assumptions(), state.fraction, method=method, carried=filters.get(method))
     payload |= by_own_criteria(state, method, payload, evidence, filters)
@@ -87,7 +87,7 @@ def outlook(state: ClutchState, method: str, evidence: Evidence, filters: States
 
 
 def by_own_criteria(
-    state: ClutchState, method: str, payload: Mapping[str, Any], evidence: Evidence, filters: States
+    state: ClutchHistory, method: str, payload: Mapping[str, Any], evidence: ClutchMeasurements, filters: States
 ) -> dict[str, Any]:
     """The fields of a prediction that the criteria of the record change; empty if only mean COF ends its life."""
     criteria = state.record.end_of_life.criteria
@@ -105,7 +105,7 @@ def by_own_criteria(
 
 
 def measured_life(
-    state: ClutchState, chosen: ChosenLife, evidence: Evidence, filters: States | None = None
+    state: ClutchHistory, chosen: ChosenLife, evidence: ClutchMeasurements, filters: States | None = None
 ) -> MeasuredLife | None:
     """A life of a clutch with all that was measured in it, None where nothing was yet."""
     if chosen.life is None:

@@ -23,7 +23,7 @@ MAX_REASONS = 20
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Task:
+class ChangeTask:
     """What is to be done: `function` (module:function) for what the job is `of`, None: for all; `at` is when it was begun,
     `by` who asked, `arguments` what else the job was asked for with."""
 
@@ -40,7 +40,7 @@ def main() -> None:
     Where the database is away meanwhile, the process ends so that the service has it done again: it takes hours, and a
     restart of the database takes seconds.
     """
-    task = Task(**json.loads(sys.argv[1]))
+    task = ChangeTask(**json.loads(sys.argv[1]))
     process.end_with_the_service()
     try:
         with closing(open_database(os.environ[DATABASE_VARIABLE])) as database:
@@ -50,7 +50,7 @@ def main() -> None:
         sys.exit(AWAY)
 
 
-def done(database: Database, task: Task, say: Callable[[Json], None], executor: Executor) -> dict[str, Any]:
+def done(database: Database, task: ChangeTask, say: Callable[[Json], None], executor: Executor) -> dict[str, Any]:
     """The result, in numbers and with the reasons why clutches were left, and the progress that was said last."""
     module, _, name = task.function.partition(":")
     function = getattr(importlib.import_module(module), name)

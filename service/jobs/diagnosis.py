@@ -33,7 +33,7 @@ _SEED = 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Task:
+class DiagnosisTask:
     """What is to be diagnosed, by `engine` (module:function): a clutch's runs up to `last_run_key`; and what it may take.
 
     `isolability`: whether to say which causes its tests could tell apart."""
@@ -49,7 +49,7 @@ class Task:
 
 def main() -> None:
     """Diagnose what the first argument names, JSON, in the database of the environment. The last line is the answer."""
-    task = Task(**json.loads(sys.argv[1]), database=os.environ[DATABASE_VARIABLE])
+    task = DiagnosisTask(**json.loads(sys.argv[1]), database=os.environ[DATABASE_VARIABLE])
     process.end_with_the_service()
     resource.setrlimit(resource.RLIMIT_AS, (task.bytes, task.bytes))
     # at the first of the two this process ends by SIGXCPU, which says why, at the second by SIGKILL
@@ -61,7 +61,7 @@ def main() -> None:
     process.answer(ended)
 
 
-def diagnosed(task: Task, say: Callable[[Json], None] = lambda _: None) -> dict[str, Any]:
+def diagnosed(task: DiagnosisTask, say: Callable[[Json], None] = lambda _: None) -> dict[str, Any]:
     """The report in the public shape, and the extension. The same runs give the same, whatever their clutch is called."""
     module, _, function = task.engine.partition(":")
     diagnose = getattr(importlib.import_module(module), function)

@@ -154,7 +154,7 @@ class _Task:
     lost: int = 0
 
 
-class _Elsewhere(Executor):
+class _RemoteExecutor(Executor):
     """An executor whose processes get inputs one by one."""
 
     elsewhere = True
@@ -244,7 +244,7 @@ _COUNT_SECONDS = 5.0
 INPUTS_AHEAD = 2
 
 
-class Processes(_Elsewhere):
+class Processes(_RemoteExecutor):
     """The executor `processes:N`. A process that ends is replaced, and what it did is done again."""
 
     lost = BrokenExecutor, "the process that computed this ended at each attempt"
@@ -308,7 +308,7 @@ def release() -> dict[str, str]:
     return {"python": platform.python_version()} | {name: version(name) for name in _OF_RESULTS}
 
 
-class Cluster(_Elsewhere):
+class Cluster(_RemoteExecutor):
     """The executor of a scheduler's address. What a worker did that has ended is done again by another."""
 
     def __init__(self, address: str) -> None:

@@ -3,7 +3,7 @@
 Jobs are rows (`storage.jobs`), so any service on the database does them: who is free claims the next one and prolongs its
 lease while it works. The job of a service that was killed is claimed by another once the lease has run out; one that was
 cancelled, wherever that was asked for, is ended at the next prolongation. How a kind of job is done, and how its end is
-stored, is a `Kind`.
+stored, is a `JobKind`.
 """
 
 import logging
@@ -33,7 +33,7 @@ CLOCK_PER_PROCESSOR_SECOND = 6.0
 
 
 @dataclass(frozen=True, slots=True)
-class Kind:
+class JobKind:
     """How a kind's jobs are done; `finish` stores how one ended: what its process answered, or its `problem`."""
 
     work: Callable[[JobRow, Settings], Work]
@@ -95,7 +95,7 @@ _log = logging.getLogger("clutchlife")
 class JobQueue:
     """The threads that do jobs. `start` it once the database is open, `close` it before that is closed."""
 
-    def __init__(self, database: Database, settings: Settings, groups: Sequence[Mapping[str, Kind]]) -> None:
+    def __init__(self, database: Database, settings: Settings, groups: Sequence[Mapping[str, JobKind]]) -> None:
         """`groups`: how jobs are done, by their kind; of each group one job at a time."""
         self._database = database
         self._settings = settings
@@ -136,7 +136,7 @@ class JobQueue:
             self._wakes += 1
             self._change.notify_all()
 
-    def _work(self, group: Mapping[str, Kind]) -> None:
+    def _work(self, group: Mapping[str, JobKind]) -> None:
         """Do the jobs of a group one after the other; where none is free, wait until the queue is woken, or for a pause."""
         seen = 0
 
@@ -155,7 +155,7 @@ class JobQueue:
                 self._change.wait_for(woken, self._pause)
                 seen = self._wakes
 
-    def _claimed(self, group: Mapping[str, Kind]) -> JobRow | None:
+    def _claimed(self, group: Mapping[str, JobKind]) -> JobRow | None:
         """The next job of a group, claimed; None where there is none, or the database is away for a while."""
         try:
             with self._database.reading() as connection:
@@ -172,7 +172,7 @@ class JobQueue:
         self._away = False
         return claimed
 
-    def _do(self, job: JobRow, kind: Kind) -> None:
+    def _do(self, job: JobRow, kind: JobKind) -> None:
         try:
             request_id.set(job.arguments["request"])
             ended = self._outcome(job, kind)
@@ -182,7 +182,7 @@ class JobQueue:
             _log.exception("%s %s of %s", job.kind, job.job_id, job.clutch_id)
             self._give_up(job, kind)
 
-    def _stored(self, job: JobRow, kind: Kind, ended: Mapping[str, Any]) -> None:
+    def _stored(self, job: JobRow, kind: JobKind, ended: Mapping[str, Any]) -> None:
         """Have its end stored, the lease prolonged meanwhile: what is adopted is tracked again first."""
         done = threading.Event()
         renewing = threading.Thread(target=self._renew_until, args=(done, job), name="lease", daemon=True)
@@ -205,7 +205,7 @@ class JobQueue:
         while not done.wait(self._pause) and self._renewed(job, {"step": "stores"}):
             pass
 
-    def _give_up(self, job: JobRow, kind: Kind) -> None:
+    def _give_up(self, job: JobRow, kind: JobKind) -> None:
         """Its end could not be stored: say at least that it ended, at the least of the job itself, or leave that to who
         claims it next."""
         for end in (partial(kind.finish, job, {"problem": UNSTORED}), partial(self._end_as_failed, job)):
@@ -220,7 +220,7 @@ class JobQueue:
         with self._database.writing(of=self._name) as connection:
             jobs.end(connection, job.job_id, jobs.FAILED, _now(), problem=UNSTORED, claimer=job.claimed_by)
 
-    def _outcome(self, job: JobRow, kind: Kind) -> dict[str, Any] | None:
+    def _outcome(self, job: JobRow, kind: JobKind) -> dict[str, Any] | None:
         """What its process wrote, or a problem; None where it is not to be ended now: by another service, or later."""
         if job.attempts > MAX_ATTEMPTS:
             return {"problem": GIVEN_UP}

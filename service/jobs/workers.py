@@ -391,7 +391,7 @@ class _Here(_Worker):
         return call.function(self._database, *call.arguments)
 
 
-class _Elsewhere(_Worker):
+class _WorkerProcess(_Worker):
     """Calls in a process, which `arguments` (the database, how it yields and logs) begin.
 
     Only `check` and `stop` are called from other threads; they end processes and wait for nothing.
@@ -546,7 +546,7 @@ def in_processes(
     def make(lane: Lane) -> _Worker:
         # what yields to all others may be left without a processor for long
         silence = 30 * _SILENCE if lane.value is None else _SILENCE
-        return _Elsewhere(starter, (database.url, lane.value, log), silence=silence)
+        return _WorkerProcess(starter, (database.url, lane.value, log), silence=silence)
 
     return Workers(make, dict.fromkeys(Lane, 1) | {Lane.RUNS: processes}, note)
 

@@ -30,7 +30,7 @@ from service.readers.limits import Limits
 from service.readers.long_table import says_valid, valid_rows, widened
 from service.readers.missing_values import drop_totals, mask_stated_marks, refuse_stand_ins
 from service.readers.numerals import empty_cells, plain, read_cells
-from service.readers.table import NO_MISSING, NO_TIME, Clock, Column, Reading, Table, index_of_wanted, labels, marks
+from service.readers.table import NO_MISSING, NO_TIME, Clock, FileColumn, Reading, Table, index_of_wanted, labels, marks
 
 #: The code of the notice that lists unused columns.
 LEFT_OUT = "columns_left_out"
@@ -131,7 +131,7 @@ def _chosen_table(columns: dict[str, FloatArray], table: Table, reading: Reading
 
 
 def _clocks(
-    columns: Sequence[Column], taken: Sequence[Taken], values: Mapping[int, FloatArray]
+    columns: Sequence[FileColumn], taken: Sequence[Taken], values: Mapping[int, FloatArray]
 ) -> dict[int, Clock | None]:
     """The clock of each column that is taken and is no time: a column of times, its recorder's, or none."""
     times = {column.index: _column_clock(columns, column, values) for column in taken if column.channel == "time_s"}
@@ -157,7 +157,7 @@ def _clocks(
     return clocks
 
 
-def _column_clock(columns: Sequence[Column], column: Taken, values: Mapping[int, FloatArray]) -> Clock:
+def _column_clock(columns: Sequence[FileColumn], column: Taken, values: Mapping[int, FloatArray]) -> Clock:
     """A column as a clock. LabVIEW's text files number their rows where they have no clock, so a guessed time column, or one
     with whole numbers from 0, may be a sample counter (`counts`)."""
     times = values[column.index]
@@ -292,7 +292,7 @@ def _numbers(column: Taken, values: NDArray[Any], start: Any) -> tuple[FloatArra
     return numbers, valid
 
 
-def _in_seconds(column: Column, times: FloatArray, reading: Reading) -> list[Notice]:
+def _in_seconds(column: FileColumn, times: FloatArray, reading: Reading) -> list[Notice]:
     """Scale times without a unit that only as one of a computer's counts are of our time, in place, from the first on, and
     say so.
 
@@ -323,7 +323,7 @@ def _in_seconds(column: Column, times: FloatArray, reading: Reading) -> list[Not
     raise InvalidError.of(message, code="missing_unit", pointer="/map")
 
 
-def _left_out(columns: Mapping[int, Column], taken: Sequence[Taken], reading: Reading) -> list[Notice]:
+def _left_out(columns: Mapping[int, FileColumn], taken: Sequence[Taken], reading: Reading) -> list[Notice]:
     """Notices about columns of the table that are not used."""
     notices = []
     if part := [f"{column.channel} from {columns[column.index].shown()}" for column in taken if column.in_part]:

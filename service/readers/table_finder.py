@@ -16,7 +16,7 @@ from service.readers.column_names import bare_unit, column_of, is_counter, known
 from service.readers.limits import LONGEST_TITLE, LONGEST_UNIT
 from service.readers.numerals import NUMBER, is_stamp, with_unit_apart
 from service.readers.stated_clocks import stated_clock
-from service.readers.table import Column, Table, labels
+from service.readers.table import FileColumn, Table, labels
 from service.readers.unit_table import conversion, is_unit
 
 Row = Sequence[Any]
@@ -70,7 +70,7 @@ class Layout:
         """How well a separator or an encoding reads the table: known titles, less what they are more or fewer than cells."""
         return self.score[0] + self.score[1], *self.score
 
-    def columns(self) -> tuple[Column, ...]:
+    def columns(self) -> tuple[FileColumn, ...]:
         """The columns. Raises InvalidError on a title that is too long, or beside whose unit another is stated."""
         return tuple(
             column_of(title, group=group, moments=True)
@@ -148,7 +148,7 @@ def table_in(data: DataRows, *, first_line: int, rows_read: Callable[[], int], *
     counted = _counted(columns, head)
     for place, column in enumerate(columns):
         if is_counter(column) and shown(data.first_row)[place : place + 1] == ("",):
-            columns[place] = Column("", title=column.title)
+            columns[place] = FileColumn("", title=column.title)
             continue
         own_rows = [row for row in above if len(row) > place and row[place]]
         labelled = [(row[0], row[place]) if place and row in own_rows else row for row in above]
@@ -165,7 +165,7 @@ def table_in(data: DataRows, *, first_line: int, rows_read: Callable[[], int], *
     )
 
 
-def _counted(columns: Sequence[Column], head: Sequence[Sequence[str]]) -> str:
+def _counted(columns: Sequence[FileColumn], head: Sequence[Sequence[str]]) -> str:
     """Which column of whole numbers that is no channel counts samples in steps of several; "" where none does."""
     for place, column in enumerate(columns):
         cells = [row[place] for row in head if len(row) > place]

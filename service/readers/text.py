@@ -85,7 +85,7 @@ def read_text(opened: Open, reading: Reading, limits: Limits) -> Table:
             raise TooLargeError(message) from None
         table = read_text(lambda: nullcontext(io.BytesIO(on_its_side)), reading, limits)
         return replace(table, notices=[*table.notices, TURNED])
-    body = _Body(opened, form, reading, limits)
+    body = _DataBody(opened, form, reading, limits)
     return table_in(
         body.data, first_line=form.first_line, read=body.read, rows_read=lambda: body.rows, line_of=body.line_of
     )
@@ -256,7 +256,7 @@ def wrong_line(line: int, rule: str, code: str, got: str = "") -> InvalidError:
 # --- the rows of data ---
 
 
-class _Body:
+class _DataBody:
     """The rows of data, block by block: columns of text into columns of numbers."""
 
     def __init__(self, opened: Open, form: _Form, reading: Reading, limits: Limits) -> None:

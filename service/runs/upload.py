@@ -14,7 +14,7 @@ from service.clutch.incoming_run import IncomingRun, SampledChannels, name_run
 from service.errors import FieldError, InvalidError, Notice
 from service.readers.assemble import LEFT_OUT, Channels
 from service.readers.read_file import read_file
-from service.readers.table import Choice, Reading
+from service.readers.table import ColumnChoice, Reading
 from service.runs.rig_profile import Named, named
 
 #: The channels that each kind of run must have, and the channels that it may have.
@@ -98,8 +98,10 @@ def reading_with(profile: RigProfile | None, reading: Reading) -> Reading:
     """How a file is read by a profile; what `reading` says itself wins."""
     if profile is None:
         return reading
-    choices: dict[str, Choice] = {
-        own.channel: Choice(column=own.title, unit=own.unit, stated=own.stated, factor=own.scale, offset=own.offset)
+    choices: dict[str, ColumnChoice] = {
+        own.channel: ColumnChoice(
+            column=own.title, unit=own.unit, stated=own.stated, factor=own.scale, offset=own.offset
+        )
         for own in profile.columns
         if own.channel
     }

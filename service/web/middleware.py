@@ -152,7 +152,7 @@ class BodyLimit(_OfRequests):
         if announced.isdigit() and int(announced) > bound:
             await refused(TooLargeError, detail)(scope, receive, send)
             return
-        body = _Body(self.left, in_memory)
+        body = _RequestBody(self.left, in_memory)
         clock = asyncio.get_running_loop().time
         begun, whole = clock(), False
 
@@ -185,7 +185,7 @@ class BodyLimit(_OfRequests):
             body.leave()
 
 
-class _Body:
+class _RequestBody:
     """The body of a request as far as it has arrived, and what it takes of the bytes `left` to all, by place."""
 
     def __init__(self, left: dict[str, int], in_memory: int) -> None:

@@ -23,7 +23,7 @@ from fastapi.responses import Response
 from pydantic import BaseModel
 from starlette.requests import ClientDisconnect
 
-from service.answers.cache import Answer, Made, Page, name_of, revision_and_json, shared_answer, to_json
+from service.answers.cache import CachedAnswer, Made, Page, name_of, revision_and_json, shared_answer, to_json
 from service.api.parameters import ClutchId
 from service.errors import UnsupportedMediaTypeError, unknown_clutch
 from service.jobs.workers import CHANGE_SECONDS, Lane
@@ -48,7 +48,7 @@ _FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n")
 
 
 @dataclass(frozen=True, slots=True)
-class Table:
+class ExportedTable:
     """A table that is exported: the `rows` of an answer, and their columns where there are none."""
 
     rows: Callable[[Mapping[str, Any]], Rows]
@@ -93,10 +93,12 @@ async def answer(
     request: Request, query: Callable[Given, object], *given: Given.args, **more: Given.kwargs
 ) -> Response:
     """A GET's answer that is made again each time; its ETag is that of the bytes: it changes when and only when they do."""
-    return tagged(request, Answer.of(await run_in_threadpool(lambda: to_json(query(*given, **more)))), JSON_TYPE)
+    return tagged(request, CachedAnswer.of(await run_in_threadpool(lambda: to_json(query(*given, **more)))), JSON_TYPE)
 
 
-async def cached_answer(context: Context, key: Hashable, version: Hashable, make: Callable[[], bytes | Page]) -> Answer:
+async def cached_answer(
+    context: Context, key: Hashable, version: Hashable, make: Callable[[], bytes | Page]
+) -> CachedAnswer:
     """What the cache has for `key` at `version`; where it has nothing yet, `make` is called in a thread."""
     answer = context.cache.held(key, version)
     if answer is not None:
@@ -186,7 +188,7 @@ async def clutch_answer(of: OfClutch, query: Callable[..., dict[str, Any] | byte
     return tagged(of.request, answer, JSON_TYPE, revision)
 
 
-async def clutch_table(of: OfClutch, query: Query, table: Table, *arguments: Hashable) -> Response:
+async def clutch_table(of: OfClutch, query: Query, table: ExportedTable, *arguments: Hashable) -> Response:
     """The CSV export of a page that follows from a clutch's revision. Raises NotFoundError."""
     revision = _revision(of)
     key = (of.clutch_id, f"{name_of(query)}.csv", *arguments)
@@ -215,7 +217,7 @@ async def computed_answer(
 
 
 async def computed_table(
-    of: OfClutch, query: Query, table: Table, *arguments: Hashable, prefer: str | None = None
+    of: OfClutch, query: Query, table: ExportedTable, *arguments: Hashable, prefer: str | None = None
 ) -> Response:
     """The CSV export of the same: a page of the rows of its JSON, which goes on where that does. Raises NotFoundError."""
     revision, answer = await _computed(of, _revision(of), query, arguments, prefer)
@@ -253,7 +255,7 @@ async def _computed(
     arguments: tuple[Hashable, ...],
     prefer: str | None,
     lane: Lane = Lane.ANSWERS,
-) -> tuple[int, Answer]:
+) -> tuple[int, CachedAnswer]:
     context, clutch_id = of.context, of.clutch_id
     preferred = preferred_wait(prefer)
     wait = preferred if preferred is not None else WAIT_SECONDS if context.workers.are_idle() else 0
@@ -304,10 +306,10 @@ def _revision(of: OfClutch) -> int:
 
 async def table(request: Request, make: Callable[[], Page]) -> Response:
     """A GET's answer as CSV that is made again each time, a page of it."""
-    return tagged(request, Answer.of(await run_in_threadpool(make)), CSV_TYPE)
+    return tagged(request, CachedAnswer.of(await run_in_threadpool(make)), CSV_TYPE)
 
 
-def tagged(request: Request, answer: Answer, media_type: str, revision: int | None = None) -> Response:
+def tagged(request: Request, answer: CachedAnswer, media_type: str, revision: int | None = None) -> Response:
     """The answer, or 304 where `If-None-Match` names it; with the clutch's revision that it is of, where it is of one."""
     headers = {"ETag": answer.tag, "Cache-Control": "no-cache"}
     if revision is not None:

@@ -11,8 +11,8 @@ from dataclasses import dataclass, field, replace
 
 from models.clutch import Geometry
 from models.plausibility import criteria
-from models.plausibility.judgement import Judgement, Verdict, judge
-from models.plausibility.slips import OF_CYCLES, OTHER_CYCLES, Reading
+from models.plausibility.judgement import JointJudgement, SlipVerdict, judge
+from models.plausibility.slips import OF_CYCLES, OTHER_CYCLES, RunReading
 from service.channels import PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM, ZERO_CELSIUS
 from service.clutch.analysis import Analysis
 from service.clutch.incoming_run import IncomingRun
@@ -25,7 +25,7 @@ BEYOND_PHYSICS, OFF_COURSE = "cof_beyond_physics", "cof_off_course"
 UNIT = "unit"
 
 
-def doubt(verdict: Verdict, sent: Reading, shown: Shown) -> Notice:
+def doubt(verdict: SlipVerdict, sent: RunReading, shown: Shown) -> Notice:
     """The doubt of which the verdict's slip is the most probable explanation."""
     slip = verdict.slip
     if slip.name in OF_CYCLES:
@@ -50,7 +50,7 @@ def negative(cof: float) -> Notice:
     return Notice(code=BEYOND_PHYSICS, message=message)
 
 
-def _cycles_notice(verdict: Verdict, sent: Reading) -> Notice:
+def _cycles_notice(verdict: SlipVerdict, sent: RunReading) -> Notice:
     sentences = [_gap(verdict, sent.cycles)]
     if verdict.against_time:
         sentences.append("Its date (started_at) does not fit the order of the cycles.")
@@ -65,7 +65,7 @@ def _cycles_notice(verdict: Verdict, sent: Reading) -> Notice:
     return Notice(code=AGAINST_TIME if verdict.against_time else OFF_PACE, message=message, likely_cycles=likely)
 
 
-def _gap(verdict: Verdict, cycles: float) -> str:
+def _gap(verdict: SlipVerdict, cycles: float) -> str:
     if verdict.latest is None:
         return f"{_number(cycles)} cycles are more than any clutch lasts."
     if verdict.before is None or cycles <= verdict.latest + 0.5:
@@ -77,7 +77,7 @@ def _gap(verdict: Verdict, cycles: float) -> str:
     return f"{gap}." if usual is None else f"{gap}; earlier runs were about {_number(usual)} cycles apart."
 
 
-def _unit_notice(verdict: Verdict, shown: Shown) -> Notice:
+def _unit_notice(verdict: SlipVerdict, shown: Shown) -> Notice:
     slip = verdict.slip
     if slip.name == "oil":
         oil = (shown.oil or 0.0) - ZERO_CELSIUS
@@ -97,7 +97,7 @@ def _unit_notice(verdict: Verdict, shown: Shown) -> Notice:
     return Notice(code=UNIT, message=f"{message} Withdraw the run and send it in the channel's unit, or confirm it.")
 
 
-def _expected_then(verdict: Verdict) -> bool:
+def _expected_then(verdict: SlipVerdict) -> bool:
     """Whether COF without the slip is as expected: else no unit is asked for, though it explains a part."""
     likely = verdict.slip.likely
     if verdict.expected_then is None or likely.log_cof is None:
@@ -105,13 +105,13 @@ def _expected_then(verdict: Verdict) -> bool:
     return verdict.expected_then[0] <= math.exp(likely.log_cof) <= verdict.expected_then[1]
 
 
-def _expected(verdict: Verdict) -> str:
+def _expected(verdict: SlipVerdict) -> str:
     if verdict.expected is None:
         return ""
     return f", where {verdict.expected[0]:.3g} to {verdict.expected[1]:.3g} is expected"
 
 
-def _cof_notice(verdict: Verdict, sent: Reading) -> Notice:
+def _cof_notice(verdict: SlipVerdict, sent: RunReading) -> Notice:
     cof = math.exp(sent.log_cof or -20.0)
     beyond = abs(math.log(cof / criteria.COF)) / criteria.LOG_COF_SD > 2.5
     cause = "Is a sensor or a unit wrong?" if beyond else "Is it another clutch's test?"
@@ -221,7 +221,7 @@ def _doubted(accepted: Sequence[Event], held: Sequence[Event], new: Sequence[Eve
     return [event for event in held if event.shown is not None and beyond_end(order([*accepted, *new, event])) is None]
 
 
-def _levels(events: Sequence[Event], judgement: Judgement) -> dict[str, bool]:
+def _levels(events: Sequence[Event], judgement: JointJudgement) -> dict[str, bool]:
     """Whether a test begins a new level that did not, or does not that did, by run_id."""
     return {
         events[index].run_id: index in judgement.levels

@@ -16,7 +16,7 @@ import numpy as np
 from models.arrays import FloatArray
 from models.clutch import Geometry
 from models.plausibility import criteria as odds
-from models.plausibility.slips import Reading, Run, Slip
+from models.plausibility.slips import Run, RunReading, Slip
 from models.records.criteria import UNLOADED
 from service.channels import PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM, ZERO_CELSIUS
 from service.clutch.analysis import Analysis
@@ -164,11 +164,11 @@ class _Comparison:
             return False
         return abs(event.oil_temperature - self.oil) > OTHER_OIL
 
-    def reading(self, event: Event, shown: Shown, cofs: Mapping[float, tuple[float, float]] | None) -> Reading:
+    def reading(self, event: Event, shown: Shown, cofs: Mapping[float, tuple[float, float]] | None) -> RunReading:
         """The reading of a run that shows this."""
         log_cof, spread = self._compared(event, shown, cofs) or (None, 0.0)
         protocol = self._log_protocol(event, shown)
-        return Reading(cycles=event.cycles, log_cof=log_cof, spread=spread, log_protocol=protocol)
+        return RunReading(cycles=event.cycles, log_cof=log_cof, spread=spread, log_protocol=protocol)
 
     def _compared(
         self, event: Event, shown: Shown, mean_cof: Mapping[float, tuple[float, float]] | None

@@ -8,8 +8,8 @@ import numpy as np
 from models.arrays import FloatArray
 from models.prognosis.criteria import BAND, FEWEST_TESTS, QUANTILES
 from models.prognosis.first_passage import weighted_quantiles
-from models.tracking.courses import Course
-from models.tracking.posterior import Posterior
+from models.tracking.courses import CourseForm
+from models.tracking.posterior import TrackPosterior
 from models.tracking.sampling import thinned
 from service.channels import whole
 from service.clutch.quantities.measured import Quantity, place_of
@@ -31,7 +31,7 @@ def trajectory_cycles(series: Series, until: float | None) -> FloatArray:
 
 
 def track_item(
-    quantity: Quantity, series: Series, posterior: Posterior, draws: int = 0, until: float | None = None
+    quantity: Quantity, series: Series, posterior: TrackPosterior, draws: int = 0, until: float | None = None
 ) -> dict[str, Any]:
     """A quantity that has a track of its own; the course of the model in force is put back on. `draws` > 0: with so many
     joint draws of the coefficients. With too few tests there is only what was measured."""
@@ -41,7 +41,7 @@ def track_item(
     course = series.assumptions.offsets(series.quantity, series.pressure, cycles)
     values = posterior.values(series.scale.progress(cycles)) + posterior.beside(course)
     band = np.array([weighted_quantiles(row, posterior.weight, BAND) for row in values])
-    home = np.flatnonzero(posterior.course == Course.EQ_6)
+    home = np.flatnonzero(posterior.course == CourseForm.EQ_6)
     share = float(posterior.weight[home].sum())
     coefficients: dict[str, Any] = dict.fromkeys(_OF_EQ_6) | {"eq6_probability": share}
     if share > 0.0:
@@ -84,12 +84,12 @@ def _item(
     }
 
 
-def _samples(draws: Posterior) -> Sequence[FloatArray]:
+def _samples(draws: TrackPosterior) -> Sequence[FloatArray]:
     """The coefficients [n] in the order of COEFFICIENTS."""
     return draws.initial, draws.change, draws.scale, draws.exponent
 
 
-def _coefficients(draws: Posterior) -> dict[str, dict[str, Any]]:
+def _coefficients(draws: TrackPosterior) -> dict[str, dict[str, Any]]:
     """Mean, deviation and quantiles of each coefficient."""
     coefficients = {}
     for name, sample in zip(COEFFICIENTS, _samples(draws), strict=True):
@@ -100,7 +100,7 @@ def _coefficients(draws: Posterior) -> dict[str, dict[str, Any]]:
     return coefficients
 
 
-def _correlations(draws: Posterior) -> list[list[float]]:
+def _correlations(draws: TrackPosterior) -> list[list[float]]:
     """The correlations of ξ0, Δ, log φ and log ε, [4][4]; none with what has no spread."""
     table = np.stack([draws.initial, draws.change, np.log(draws.scale), np.log(draws.exponent)])
     off = table - (table @ draws.weight)[:, None]

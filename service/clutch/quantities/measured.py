@@ -17,7 +17,7 @@ from models.prognosis.criteria import FEWEST_TESTS
 from models.prognosis.first_passage import weighted_quantiles
 from models.prognosis.from_parameters import PressureLevel, slope_paths
 from models.tracking.filters.grid import Grid
-from models.tracking.posterior import Posterior, mixture
+from models.tracking.posterior import TrackPosterior, mixture
 from service.api.life import ALIASES
 from service.channels import PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM, bar, whole
 from service.clutch.analysis import LevelFit, Value
@@ -25,7 +25,7 @@ from service.clutch.assumptions import ALL_PRESSURES, MEAN_COF, Assumptions
 from service.clutch.criteria import FEWEST_SPEEDS, TRAJECTORY_DRAWS, TRAJECTORY_LATTICE
 from service.clutch.engagements import ALL_INDICATORS
 from service.clutch.items import PARAMETER_UNITS
-from service.clutch.recomputation import ClutchState
+from service.clutch.recomputation import ClutchHistory
 from service.clutch.timeline import DYNAMIC, Event, Life, Series, lives_of, nearest, nearest_pressure, order
 from service.clutch.tracking import States, advance, drawn, step_rng
 from service.errors import InvalidError, NotFoundError
@@ -117,7 +117,7 @@ class ChosenLife:
         }
 
 
-def chosen_life(state: ClutchState, number: int | None = None, at_cycles: float | None = None) -> ChosenLife:
+def chosen_life(state: ClutchHistory, number: int | None = None, at_cycles: float | None = None) -> ChosenLife:
     """Life `number` of a clutch (None: the one that lasts at `at_cycles`, or at present), up to `at_cycles`.
 
     Each life is tracked under what was adopted for it. Raises NotFoundError where there is no such life.
@@ -138,7 +138,7 @@ def chosen_life(state: ClutchState, number: int | None = None, at_cycles: float 
     return ChosenLife(life=life, assumptions=assumptions, number=max(index, 1), of=len(lives), held=held_runs)
 
 
-def _held_runs_of_life(state: ClutchState, number: int, at_cycles: float | None) -> tuple[Event, ...]:
+def _held_runs_of_life(state: ClutchHistory, number: int, at_cycles: float | None) -> tuple[Event, ...]:
     """The held runs that an answer about life `number` at `at_cycles` (None: whenever) is without."""
     lives = state.lives
     now = at_cycles is None or not state.events or at_cycles >= state.events[-1].cycles
@@ -154,13 +154,13 @@ def _held_runs_of_life(state: ClutchState, number: int, at_cycles: float | None)
 
 
 #: A series and a weighted sample of its eq. 6.
-Track = tuple[Series, Posterior]
+Track = tuple[Series, TrackPosterior]
 
 _NODES, _ROWS, _LEVELS = TRAJECTORY_LATTICE
 _GRID = Grid(nodes=_NODES, rows=_ROWS, levels=_LEVELS)
 
 
-def posterior_of(series: Series, method: str = _GRID.name) -> Posterior:
+def posterior_of(series: Series, method: str = _GRID.name) -> TrackPosterior:
     """A weighted sample of a series' eq. 6, the same each time; by the exact filter on a lattice fit for plots, else by the
     filter of that name taken through all measurements."""
     if method != _GRID.name:

@@ -22,7 +22,7 @@ from service.web import auth, responses
 from service.web.context import Context
 from service.web.middleware import remember
 from service.web.problems import READING, SENDING
-from storage.clutches import Choice
+from storage.clutches import ClutchSelection
 
 router = APIRouter(prefix="/v1/clutches", tags=["clutches"])
 fleet_router = APIRouter(prefix="/v1/fleet", tags=["fleet"])
@@ -75,7 +75,7 @@ async def list_clutches(
     """The clutches of the key, with health and remaining life: the lowest safe bound first, or by name. To read all
     of them, sort by name: then none is missed or repeated.
     """
-    choice = Choice(archived=archived, only=auth.grant_of(request).clutches, state=state, held=held, find=find)
+    choice = ClutchSelection(archived=archived, only=auth.grant_of(request).clutches, state=state, held=held, find=find)
     make = partial(clutch_list.page_as_json, context.database, context.cache, choice, part, offset=offset, sort=sort)
     return await _answer_about_all_clutches(request, context, ("clutches", choice, part, offset, sort), make)
 
@@ -83,7 +83,7 @@ async def list_clutches(
 @totals_router.get("/totals", response_model=FleetTotals, responses=READING)
 async def totals(request: Request, context: auth.OwnReader, archived: Archived = False, find: Find = "") -> Response:
     """The number of the key's clutches, by state."""
-    choice = Choice(archived=archived, only=auth.grant_of(request).clutches, find=find)
+    choice = ClutchSelection(archived=archived, only=auth.grant_of(request).clutches, find=find)
     return await _answer_about_all_clutches(
         request, context, ("totals", choice), lambda: to_json(clutch_list.totals(context.database, choice))
     )

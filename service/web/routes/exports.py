@@ -25,27 +25,29 @@ from service.web import responses
 from service.web.auth import Reader
 from service.web.context import AtCycles, Prefer, PressureBar
 from service.web.problems import READING
-from service.web.responses import Table
+from service.web.responses import ExportedTable
 from storage.engine.database import Database
 
 router = APIRouter(prefix="/v1/clutches/{clutch_id}", tags=["spreadsheets"], responses=READING)
 fleet_router = APIRouter(prefix="/v1/fleet", tags=["spreadsheets"], responses=READING)
 
-_RUNS, _CHANGES = Table(runs.rows, runs.COLUMNS), Table(runs.trail_rows, runs.TRAIL_COLUMNS)
-_INSPECTIONS = Table(inspections.rows, inspections.COLUMNS)
-_PLAN = Table(diagnoses.plan_rows, diagnoses.PLAN_COLUMNS)
-_REMAINING = Table(remaining_life.rows, remaining_life.COLUMNS)
-_DEGRADATION = Table(degradation.rows, degradation.COLUMNS)
-_STRIBECK = Table(stribeck.rows, ("run_id", "cycles", "held_runs"))
-_SURFACES = Table(stribeck.surface_rows, ("cycles", "pressure_bar"))
-_SCORES = Table(scores.rows, ("end_of_life_cycles", "cycles"))
-_LOOPS = Table(
+_RUNS, _CHANGES = ExportedTable(runs.rows, runs.COLUMNS), ExportedTable(runs.trail_rows, runs.TRAIL_COLUMNS)
+_INSPECTIONS = ExportedTable(inspections.rows, inspections.COLUMNS)
+_PLAN = ExportedTable(diagnoses.plan_rows, diagnoses.PLAN_COLUMNS)
+_REMAINING = ExportedTable(remaining_life.rows, remaining_life.COLUMNS)
+_DEGRADATION = ExportedTable(degradation.rows, degradation.COLUMNS)
+_STRIBECK = ExportedTable(stribeck.rows, ("run_id", "cycles", "held_runs"))
+_SURFACES = ExportedTable(stribeck.surface_rows, ("cycles", "pressure_bar"))
+_SCORES = ExportedTable(scores.rows, ("end_of_life_cycles", "cycles"))
+_LOOPS = ExportedTable(
     lambda loops: [loop | {"held_runs": loops["held_runs"]} for loop in loops["items"]],
     (*LoopItem.model_fields, "held_runs"),
 )
-_SERIES = Table(lambda series: series["items"], tuple(SeriesItem.model_fields))
-_STAGES = Table(lambda fleet: [*fleet["stages"], {"share_of_life": None} | fleet["overall"]], ("share_of_life",))
-_PRIORS = Table(fleet_priors.rows, fleet_priors.COLUMNS)
+_SERIES = ExportedTable(lambda series: series["items"], tuple(SeriesItem.model_fields))
+_STAGES = ExportedTable(
+    lambda fleet: [*fleet["stages"], {"share_of_life": None} | fleet["overall"]], ("share_of_life",)
+)
+_PRIORS = ExportedTable(fleet_priors.rows, fleet_priors.COLUMNS)
 
 
 def _receipts(database: Database, clutch_id: str, part: Part, state: str | None) -> dict[str, Any]:

@@ -12,8 +12,8 @@ import pytest
 
 from service.answers import cache as caches
 from service.answers.cache import (
-    Answer,
     AnswerCache,
+    CachedAnswer,
     Made,
     Revalidation,
     build_of,
@@ -213,7 +213,7 @@ def test_an_answer_that_cannot_be_shared_is_an_answer_all_the_same(
 
 # --- Slow answers: waited for where there is none, given as they were while a newer one is made, made once.
 
-Asked = tuple[int, Answer]
+Asked = tuple[int, CachedAnswer]
 
 
 class Worker:
@@ -257,10 +257,10 @@ async def test_the_first_answer_is_waited_for_and_made_once(kept: Revalidation, 
     await _settled()
     assert not any(task.done() for task in waiting)
     await worker.gives(1, b"one")
-    assert {task.result() for task in waiting} == {(1, Answer.of(b"one"))}
-    assert await kept.answer("a", 1, worker.compute, wait=0) == (1, Answer.of(b"one"))
+    assert {task.result() for task in waiting} == {(1, CachedAnswer.of(b"one"))}
+    assert await kept.answer("a", 1, worker.compute, wait=0) == (1, CachedAnswer.of(b"one"))
     assert len(worker.asked) == 1
-    assert kept._cache.held("a", 1) == Answer.of(b"one")
+    assert kept._cache.held("a", 1) == CachedAnswer.of(b"one")
     assert kept._cache.held("a", 2) is None
 
 
@@ -282,10 +282,10 @@ async def _asking(asked: Coroutine[Any, Any, Asked]) -> "asyncio.Task[Asked]":
 async def test_who_does_not_wait_gets_the_last_one_while_the_next_is_made(kept: Revalidation, worker: Worker) -> None:
     await _held_at_one(kept, worker)
     for revision in (2, 3):
-        assert await kept.answer("a", revision, worker.compute, wait=0) == (1, Answer.of(b"one"))
+        assert await kept.answer("a", revision, worker.compute, wait=0) == (1, CachedAnswer.of(b"one"))
     assert worker.waited_for == [True, False]  # one renewal for both
     await worker.gives(2, b"two")
-    assert await kept.answer("a", 2, worker.compute, wait=0) == (2, Answer.of(b"two"))
+    assert await kept.answer("a", 2, worker.compute, wait=0) == (2, CachedAnswer.of(b"two"))
 
 
 @scenario
@@ -293,9 +293,9 @@ async def test_who_waits_does_not_wait_for_a_renewal_that_yields_to_all_others(
     kept: Revalidation, worker: Worker
 ) -> None:
     await _held_at_one(kept, worker)
-    assert await kept.answer("a", 2, worker.compute, wait=0) == (1, Answer.of(b"one"))
+    assert await kept.answer("a", 2, worker.compute, wait=0) == (1, CachedAnswer.of(b"one"))
     renewal = worker.asked[-1]
-    assert await kept.answer("a", 3, worker.compute, wait=0.01) == (1, Answer.of(b"one"))
+    assert await kept.answer("a", 3, worker.compute, wait=0.01) == (1, CachedAnswer.of(b"one"))
     patient = [asyncio.create_task(kept.answer("a", 3, worker.compute, wait=20)) for _ in range(3)]
     await _settled()
     assert worker.waited_for == [True, False, True]  # one for all who wait
@@ -303,10 +303,10 @@ async def test_who_waits_does_not_wait_for_a_renewal_that_yields_to_all_others(
     assert not any(task.done() for task in patient)  # a revision came while it was made
     assert worker.waited_for == [True, False, True, True]
     await worker.gives(3, b"3rd")
-    assert {await task for task in patient} == {(3, Answer.of(b"3rd"))}
+    assert {await task for task in patient} == {(3, CachedAnswer.of(b"3rd"))}
     renewal.set_result((2, b"old"))
     await _settled()
-    assert kept._cache.held("a", 3) == Answer.of(b"3rd")  # the slower and older one replaces nothing
+    assert kept._cache.held("a", 3) == CachedAnswer.of(b"3rd")  # the slower and older one replaces nothing
 
 
 @scenario
@@ -320,7 +320,7 @@ async def test_who_waits_takes_a_quicker_renewal_and_does_not_hear_of_its_failur
         patient = await _asking(kept.answer("a", revision, worker.compute, wait=20))
         if error is None:
             renewal.set_result((revision, b"idle"))
-            assert await patient == (revision, Answer.of(b"idle"))
+            assert await patient == (revision, CachedAnswer.of(b"idle"))
         else:
             renewal.set_exception(error)
             await _settled()
@@ -340,20 +340,20 @@ async def test_what_fails_is_told_to_those_who_wait_and_tried_again(kept: Revali
     worker.asked[-1].set_exception(LookupError("not now"))
     with pytest.raises(LookupError, match="not now"):
         await waiting
-    assert await kept.answer("a", 2, worker.compute, wait=0) == (1, Answer.of(b"one"))
+    assert await kept.answer("a", 2, worker.compute, wait=0) == (1, CachedAnswer.of(b"one"))
 
 
 @scenario
 async def test_what_is_being_made_is_not_made_twice_to_make_room(kept: Revalidation, worker: Worker) -> None:
     kept.begin("renewed", 1, b"four")
-    assert await kept.answer("renewed", 2, worker.compute, wait=0) == (1, Answer.of(b"four"))
+    assert await kept.answer("renewed", 2, worker.compute, wait=0) == (1, CachedAnswer.of(b"four"))
     first = await _asking(kept.answer("made", 1, worker.compute, wait=0))
     for name in ("a", "b", "c"):
         kept.begin(name, 1, b"four")
     second = asyncio.create_task(kept.answer("made", 1, worker.compute, wait=0))
-    assert await kept.answer("renewed", 2, worker.compute, wait=0) == (1, Answer.of(b"four"))
+    assert await kept.answer("renewed", 2, worker.compute, wait=0) == (1, CachedAnswer.of(b"four"))
     await _settled()
     assert [name for name in ("renewed", "made", "a", "b", "c") if kept.knows(name)] == ["renewed", "made", "c"]
     await worker.gives(1, b"one")
-    assert await first == await second == (1, Answer.of(b"one"))
+    assert await first == await second == (1, CachedAnswer.of(b"one"))
     assert len(worker.asked) == 2

@@ -11,7 +11,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from models.rig.campaign import simulate
-from models.rig.programme import Programme
+from models.rig.programme import RigProgramme
 from models.rig.sampled import DynamicTest
 from service.runs.simulated import simulated_body
 from tests.service.clients import client_on
@@ -27,7 +27,9 @@ def aged(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
     database = f"sqlite:///{tmp_path_factory.mktemp('aged') / 'clutchlife.db'}"
     with client_on(database, clutch_metrics=True) as client:
         client.post("/v1/clutches", json={"clutch_id": "bench"})
-        for run in simulate(7, most_tests=3, programme=Programme(dynamic=DynamicTest(rate=25.0, pressures=(4e5, 6e5)))):
+        for run in simulate(
+            7, most_tests=3, programme=RigProgramme(dynamic=DynamicTest(rate=25.0, pressures=(4e5, 6e5)))
+        ):
             assert client.post("/v1/clutches/bench/runs", json=simulated_body(run)).status_code == 201
         yield client
 
@@ -66,7 +68,7 @@ def test_lags_make_a_group_for_each_pressure_and_frequency_whatever_the_recorder
     assert client.post("/v1/clutches", json={"clutch_id": "bench"}).status_code == 201
     swings = [DynamicTest(rate=25.0, frequency=f, duration=1.5 / f, pressures=(4e5, 6e5)) for f in (0.1, 0.25)]
     clock = iter([1.0, 1.0, 1.003, 1.004, 0.998, 0.997])
-    for run in simulate(7, most_tests=3, programme=Programme(dynamic=swings[0], further=(swings[1],))):
+    for run in simulate(7, most_tests=3, programme=RigProgramme(dynamic=swings[0], further=(swings[1],))):
         sent = simulated_body(run)
         if sent["kind"] == "dynamic_stribeck":
             rate = next(clock)

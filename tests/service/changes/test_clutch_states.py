@@ -11,7 +11,7 @@ from service.answers.remaining_life import remaining_life
 from service.changes import run_diagnosis
 from service.changes.edit_clutch import edit
 from storage import clutches, diagnoses, jobs
-from storage.clutches import Choice
+from storage.clutches import ClutchSelection
 from storage.diagnoses import FINISHED
 from tests.service.changes.benches import AT, CLUTCH, EXTENSION, WHO, Bench, body
 from tests.service.jobs.replaying import replay_clutch
@@ -141,7 +141,7 @@ def test_the_stored_state_follows_from_all_rows(bench: Bench, seed: int) -> None
         met.add(row.state)
         shown = clutch_list.look_up(bench.database, CLUTCH)["state"]["name"]
         assert row.state == shown == expected, written.did
-        totals = clutch_list.totals(bench.database, Choice())
+        totals = clutch_list.totals(bench.database, ClutchSelection())
         assert totals["states"] == {name: int(name == expected) for name in totals["states"]}
     print(seed, met, written.did)
     assert len(met) > 1, "the state never changed: nothing was tested"

@@ -280,7 +280,7 @@ def test_the_same_runs_under_another_name_get_the_same_report_and_remaining_life
         engine = f"{stand_in_engine.__name__}:{engine}"
         named = {"database": f"sqlite:///{tmp_path / 'a.db'}", "clutch_id": clutch, "engine": engine}
         return process.diagnosed(
-            process.Task(**named, last_run_key=10**9, bytes=0, processor_seconds=0, isolability=isolability)
+            process.DiagnosisTask(**named, last_run_key=10**9, bytes=0, processor_seconds=0, isolability=isolability)
         )
 
     found = [made(clutch) for clutch in ("c1", "c2")]

@@ -11,7 +11,7 @@ from service.api.clutch import ClutchEdit, ClutchIn
 from service.changes import edit_clutch, learn_fleet
 from service.errors import ArchivedError, ConflictError
 from service.paging import WHOLE
-from storage.clutches import Choice
+from storage.clutches import ClutchSelection
 from tests.service.changes.benches import AT, CLUTCH, WHO, Bench, assert_same, body, overtaken, send_to
 
 HISTORY = (("test", 0.0), ("duty", 400.0), ("loop", 500.0), ("oil_change", 1500.0), ("test", 2000.0))
@@ -99,7 +99,9 @@ def test_an_archived_clutch_is_left_out_takes_in_no_run_and_still_teaches(bench:
     with pytest.raises(ArchivedError, match="archived"):
         bench.send(body("test", "b", 1000.0))
     assert bench.send(known)["duplicate"]
-    totals = [clutch_list.totals(bench.database, Choice(archived=archived))["all"] for archived in (False, True)]
+    totals = [
+        clutch_list.totals(bench.database, ClutchSelection(archived=archived))["all"] for archived in (False, True)
+    ]
     assert totals == [0, 1]
     assert learn_fleet.lessons_of(learn_fleet._state(bench.database, CLUTCH))[0]["fluid"] == "ATF"
     edit(bench, archived=False)

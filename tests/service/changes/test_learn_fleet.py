@@ -19,8 +19,8 @@ from service.changes.ingest_run import ingest
 from service.cli.main import app
 from service.clutch.assumptions import kind_of
 from service.clutch.plausibility.doubts import Judged
-from service.clutch.recomputation import ClutchState, Tracking
-from service.jobs.change import Task
+from service.clutch.recomputation import ClutchHistory, Tracking
+from service.jobs.change import ChangeTask
 from service.jobs.queue import work_of_change
 from service.runs.json_run import read_run
 from service.settings import Settings
@@ -160,7 +160,7 @@ def test_an_end_has_its_own_kind_learn_and_goes_before_the_rest_of_another(
     register(in_file, other, created_at=AT)
     taught: list[str] = []
 
-    def lessons_of(state: ClutchState) -> tuple[Json, list[learn_fleet.Lesson]]:
+    def lessons_of(state: ClutchHistory) -> tuple[Json, list[learn_fleet.Lesson]]:
         taught.append(state.clutch_id)
         return _lessons_of(state)
 
@@ -173,7 +173,7 @@ def test_an_end_has_its_own_kind_learn_and_goes_before_the_rest_of_another(
 
     def do_next() -> tuple[dict[str, int], dict[str, str]]:
         job = write_to(in_file, jobs.claim, "here", [jobs.FLEET_REFRESH], lease=60.0, at=AT)
-        task = Task(**work_of_change("f")(job, Settings()).task)
+        task = ChangeTask(**work_of_change("f")(job, Settings()).task)
         done = learn_fleet.as_job(in_file, task, say=lambda _: None, executor=InThread())
         write_to(in_file, jobs.end, job.job_id, jobs.FINISHED, AT)
         return done
@@ -262,7 +262,7 @@ def test_a_clutch_that_gets_a_run_whenever_it_is_tracked_anew_is_left_to_the_nex
         attempts = []
         track = learn_fleet.track
 
-        def track_while_a_run_comes(state: ClutchState) -> Tracking:
+        def track_while_a_run_comes(state: ClutchHistory) -> Tracking:
             if state.clutch_id == "live":
                 attempts.append(state.revision)
                 post_run(

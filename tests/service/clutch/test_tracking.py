@@ -7,7 +7,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from models.loops.lag_fit import StationaryCurve
-from models.prognosis.ended_lives import EndedLife
+from models.prognosis.ended_lives import ObservedLife
 from models.prognosis.fleet import FleetPrior
 from models.rig.truth import draw
 from models.tracking.filters.grid import Grid
@@ -154,7 +154,7 @@ def test_a_prediction_says_how_many_lives_it_draws_on_and_that_its_forecasts_mis
     """Two lives that ended as this one goes; of ten later tests two lay within the intervals that were forecast."""
     of, course = life(0.0), np.array([0.0, 6e3, 20e3])
     damage = (1 - (1 + course / 6000.0) ** -0.8) / (1 - (1 + 20e3 / 6000.0) ** -0.8)
-    ended = [EndedLife(end=end, fraction=0.5, progress=tuple(course), damage=tuple(damage)) for end in (21e3, 22e3)]
+    ended = [ObservedLife(end=end, fraction=0.5, progress=tuple(course), damage=tuple(damage)) for end in (21e3, 22e3)]
     said = []
     for lives, misses in (((), [0.5] * 10), (tuple(ended), [0.5] * 2 + [2.0] * 8)):
         under = replace(assumptions(1.0), prior=LearnedPrior(ended=lives))

@@ -13,7 +13,7 @@ from service.api.diagnosis import JobOut, JobPage
 from service.changes import ask_job, learn_fleet
 from service.changes.edit_clutch import register
 from service.errors import BusyError
-from service.jobs.change import MAX_REASONS, Task, done
+from service.jobs.change import MAX_REASONS, ChangeTask, done
 from service.jobs.executor import Executor
 from storage import jobs
 from storage.encoding import Json
@@ -91,11 +91,11 @@ def test_a_clutch_that_is_left_is_named_with_the_reason(in_file: Database, caplo
     assert ["c0: left as it was" in line for line in said] == [True]
 
 
-TASK = Task(function=f"{__name__}:leaving", of=None, at=AT, by="local", arguments={})
+TASK = ChangeTask(function=f"{__name__}:leaving", of=None, at=AT, by="local", arguments={})
 
 
 def leaving(
-    database: Database, task: Task, *, say: Callable[[Json], None], executor: Executor
+    database: Database, task: ChangeTask, *, say: Callable[[Json], None], executor: Executor
 ) -> tuple[dict[str, int], dict[str, str]]:
     """A change that leaves many clutches."""
     assert (database, task, type(executor)) == (None, TASK, InThread)

@@ -10,7 +10,7 @@ import pytest
 
 from service.jobs import process
 from service.jobs.process import Work
-from service.jobs.queue import JobQueue, Kind
+from service.jobs.queue import JobKind, JobQueue
 from service.settings import DATABASE_VARIABLE, Settings
 from storage import jobs
 from storage.engine.database import Database
@@ -66,7 +66,7 @@ def finish_of(database: Database) -> Callable[[JobRow, Mapping[str, Any]], None]
 
 
 @contextmanager
-def started(database: Database, *groups: Mapping[str, Kind], lease: int = 1) -> Iterator[JobQueue]:
+def started(database: Database, *groups: Mapping[str, JobKind], lease: int = 1) -> Iterator[JobQueue]:
     queue = JobQueue(database, Settings(job_lease_seconds=lease), groups)
     queue.start()
     try:
@@ -82,8 +82,8 @@ def test_of_a_group_one_is_done_at_a_time_and_other_groups_do_not_wait(
     """A diagnosis is made while a replay of the whole fleet runs; a fleet refresh waits for its end."""
     monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parents[3]))
 
-    endless = Kind(lambda _job, _settings: SLEEPS, finish_of(in_file))
-    quick = Kind(lambda _job, _settings: Work(modules=("this",), task={}, longest=0.0), finish_of(in_file))
+    endless = JobKind(lambda _job, _settings: SLEEPS, finish_of(in_file))
+    quick = JobKind(lambda _job, _settings: Work(modules=("this",), task={}, longest=0.0), finish_of(in_file))
     for job_id, kind in (("r", jobs.REPLAY), ("f", jobs.FLEET_REFRESH), ("d", jobs.DIAGNOSIS), ("other", "unheard of")):
         ask(in_file, job_id, kind)
     groups = {jobs.DIAGNOSIS: quick}, {jobs.REPLAY: endless, jobs.FLEET_REFRESH: endless}
@@ -110,7 +110,7 @@ def test_a_queue_that_is_woken_looks_at_once(in_file: Database, monkeypatch: pyt
         return free
 
     monkeypatch.setattr(jobs, "any_free", watched)
-    with started(in_file, {jobs.REPLAY: Kind(work, finish_of(in_file))}, lease=3600) as queue:
+    with started(in_file, {jobs.REPLAY: JobKind(work, finish_of(in_file))}, lease=3600) as queue:
         assert looked.wait(60.0)
         ask(in_file, "r", jobs.REPLAY)
         queue.wake()
@@ -137,7 +137,7 @@ def test_a_job_that_fails_in_any_way_is_marked_failed_and_the_next_one_runs(
 
     ask(in_file, "bad", jobs.REPLAY)
     ask(in_file, "next", jobs.REPLAY)
-    with started(in_file, {jobs.REPLAY: Kind(work, finish)}) as queue:
+    with started(in_file, {jobs.REPLAY: JobKind(work, finish)}) as queue:
         until(lambda: states(in_file) == {"bad": "failed", "next": "finished"})
         assert queue.is_working()
     row = read_from(in_file, jobs.get, "bad")

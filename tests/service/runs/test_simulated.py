@@ -15,7 +15,7 @@ from models.loops.loops import evaluate_loops
 from models.records.runs import curves_by_pressure
 from models.rig.campaign import simulate, simulated_clutch
 from models.rig.hidden import clutch_for
-from models.rig.programme import Programme
+from models.rig.programme import RigProgramme
 from models.rig.sampled import DynamicTest, RawTest
 from models.rig.simulated_runs import SimulatedRun
 from models.rig.stationary import SHARP
@@ -34,7 +34,7 @@ GEOMETRY = Geometry()
 FORMATS = ("csv", "tdms", "mdf4")
 
 
-def measured(programme: Programme) -> list[SimulatedRun]:
+def measured(programme: RigProgramme) -> list[SimulatedRun]:
     """The tests of the same campaign as the command makes them."""
     clutch = clutch_for(simulated_clutch(7), {})
     runs = simulate(7, clutch=clutch, sensor=SHARP, programme=programme, most_tests=1)
@@ -82,7 +82,7 @@ def test_every_format_holds_the_run_bit_for_bit(campaign: Callable[[str], Path],
 
 @pytest.mark.parametrize("form", one_quick(FORMATS))
 def test_every_format_gives_the_same_fits_and_loops(campaign: Callable[[str], Path], form: str) -> None:
-    stationary, dynamic = measured(Programme(dynamic=DynamicTest()))
+    stationary, dynamic = measured(RigProgramme(dynamic=DynamicTest()))
     read = {run.kind: run for run in map(incoming, runs_in(campaign(form)))}
     fits = fit_curves(curves_by_pressure(stationary.plateaus, GEOMETRY))
     again = fit_curves(curves_by_pressure(stationary_plateaus(read["stationary_stribeck"].channels), GEOMETRY))
@@ -94,7 +94,7 @@ def test_every_format_gives_the_same_fits_and_loops(campaign: Callable[[str], Pa
 
 
 def test_a_posted_body_says_what_the_simulated_run_is() -> None:
-    run_in = next(simulate(7, programme=Programme(engagements=True)))
+    run_in = next(simulate(7, programme=RigProgramme(engagements=True)))
     body = simulated_body(run_in)
     assert body["origin"] == "simulated"
     assert body["duty"]["energy_per_cycle_kj"] == pytest.approx(run_in.duty.energy_per_cycle / 1000)
@@ -104,7 +104,7 @@ def test_a_posted_body_says_what_the_simulated_run_is() -> None:
 
 
 def test_a_raw_stationary_test_is_written_and_read(tmp_path: Path) -> None:
-    (run,) = measured(Programme(raw=RawTest(rate=10.0)))
+    (run,) = measured(RigProgramme(raw=RawTest(rate=10.0)))
     path = tmp_path / "raw.csv"
     write_record(path, RecordFormat.CSV, simulated_channels(run), simulated_head(run))
     run_read = read_file_run(path, filename="raw.csv", kind="stationary_stribeck", cycles=0.0)
@@ -115,7 +115,7 @@ def test_a_raw_stationary_test_is_written_and_read(tmp_path: Path) -> None:
 
 
 def test_columns_are_rounded_to_nine_digits_and_to_the_nearest_double() -> None:
-    (run,) = measured(Programme())
+    (run,) = measured(RigProgramme())
     channels = simulated_channels(run)
     witness = [float(f"{value:.9g}") for value in channels["torque_nm"].tolist()]
     assert channels["torque_nm"].tolist() == witness
