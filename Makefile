@@ -112,7 +112,7 @@ check-javascript: $(VENV)/.tests $(JAVASCRIPT)/.package-lock.json
 # what the oldest releases deprecate among themselves is theirs; our own tests stay strict in `test`. Every dependency is met:
 # storage, files, numerics, the service over a socket.
 lowest: $(VENV)-lowest/.tests
-	OPENBLAS_NUM_THREADS=1 $(VENV)-lowest/bin/python -m pytest -n 2 -m "not slow" -W default::DeprecationWarning tests/storage tests/service/run_files/test_upload.py \
+	OPENBLAS_NUM_THREADS=1 $(VENV)-lowest/bin/python -m pytest -n 2 -m "not slow" -W default::DeprecationWarning tests/storage tests/service/runs/test_upload.py \
 		tests/service/readers tests/models/friction/test_identification.py \
 		tests/models/tracking/filters tests/models/diagnosis/test_extension.py tests/journeys/test_contract.py $(ARGS)
 	sha256sum tests/requirements-lowest.txt > tests/lowest.tried

@@ -11,12 +11,14 @@ from fastapi import FastAPI
 from fastapi_offline import FastAPIOffline
 
 from service.alarms.outbox import Outbox
+from service.answers.cache import AnswerCache, Revalidation
+from service.changes import adopt_model, ask_job, raw_records, run_diagnosis
 from service.dashboard import assets, site
 from service.dashboard import pages as dashboard
-from service.queries.cache import AnswerCache, Revalidation
+from service.jobs.queue import JobKind, JobQueue, diagnosis_work, work_of_change
+from service.jobs.workers import CHANGE_SECONDS, Lane, Workers, in_processes, in_threads
 from service.settings import CODE_VERSION, MIB, Settings
 from service.web import openapi, problems
-from service.web.answers import now
 from service.web.bodies import Bodies
 from service.web.context import Context
 from service.web.files import Copies, emptied_folder
@@ -24,10 +26,8 @@ from service.web.limits import MAX_CACHED_BYTES
 from service.web.metrics import Metrics
 from service.web.middleware import Answers, Edge, Encodings, Heads, Polls, RootPath, Shares
 from service.web.readiness import Readiness
+from service.web.responses import now
 from service.web.routes import alarms, clutches, diagnoses, exports, health, inspections, jobs, life, rigs, runs
-from service.work.queue import JobQueue, Kind, diagnosis_work, workflow_work
-from service.work.workers import CHANGE_SECONDS, Lane, Workers, in_processes, in_threads
-from service.workflows import adopt_model, ask_job, raw_records, run_diagnosis
 from storage.engine.database import Database
 from storage.engine.opening import open_database, service_lock
 from storage.jobs import DIAGNOSIS, FLEET_REFRESH, REPLAY, JobRow
@@ -38,7 +38,7 @@ Post the Stribeck tests of a rig. The service fits each test, tracks the clutch'
 uncertainty, how many duty cycles remain until the mean coefficient of friction has halved."""
 
 
-def _kinds(database: Database, workers: Workers) -> Sequence[Mapping[str, Kind]]:
+def _kinds(database: Database, workers: Workers) -> Sequence[Mapping[str, JobKind]]:
     """How jobs are done, by their kind, and their ends stored: what somebody wants adopted is tracked again by the workers.
 
     Of each group one is done at a time: a diagnosis does not wait until a thousand clutches are replayed.
@@ -59,10 +59,10 @@ def _kinds(database: Database, workers: Workers) -> Sequence[Mapping[str, Kind]]
         ask_job.finish(database, job, ended, at=now())
 
     return (
-        {DIAGNOSIS: Kind(diagnosis_work, finish_diagnosis)},
+        {DIAGNOSIS: JobKind(diagnosis_work, finish_diagnosis)},
         {
-            REPLAY: Kind(workflow_work("service.workflows.replay:as_job"), finish),
-            FLEET_REFRESH: Kind(workflow_work("service.workflows.learn_fleet:as_job"), finish),
+            REPLAY: JobKind(work_of_change("service.changes.replay:as_job"), finish),
+            FLEET_REFRESH: JobKind(work_of_change("service.changes.learn_fleet:as_job"), finish),
         },
     )
 

@@ -15,10 +15,19 @@ import numpy as np
 from sqlalchemy import Connection
 
 from models.friction.criteria import ACCEPTABLE_MSE
-from models.friction.identification import FitStatus, StribeckFit
+from models.friction.identification import StribeckFit, StribeckFitStatus
 from models.friction.stribeck import PARAMETER_NAMES, StribeckParameters
-from service.lives.history import ByPressure, Event, Shown, duty_block, maintenance_fields, moment_of, order, with_event
-from service.lives.run_analysis import LevelFit
+from service.clutch.analysis import LevelFit
+from service.clutch.timeline import (
+    ByPressure,
+    Event,
+    Shown,
+    duty_block,
+    maintenance_fields,
+    moment_of,
+    order,
+    with_event,
+)
 from storage import assumptions, clutches, results, runs
 from storage.clutches import ClutchRow
 from storage.engine.database import kept_of
@@ -166,13 +175,13 @@ def _levels(connection: Connection, clutch_id: str, beyond: int = 0) -> dict[str
 
 
 def level_fit(row: FitRow) -> LevelFit:
-    """The inverse of `records.fit_rows`, exactly."""
+    """The inverse of `repository.fit_rows`, exactly."""
     fit = StribeckFit(
         **{name: getattr(row, name) for name in FIT_COLUMNS},
         parameters=StribeckParameters(**{name: getattr(row, name) for name in PARAMETER_NAMES}),
         covariance=np.reshape(row.covariance, (4, 4)),
         unbiased_covariance=np.reshape(row.unbiased_covariance, (4, 4)),
-        status=FitStatus(row.status),
+        status=StribeckFitStatus(row.status),
         acceptable=row.mse_percent is not None and row.mse_percent < ACCEPTABLE_MSE,
     )
     return LevelFit(mean_pressure=row.mean_pressure, speeds=row.speeds, fit=fit)

@@ -42,7 +42,7 @@ class ClutchRow:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Choice:
+class ClutchSelection:
     """Which clutches a list shows: in use or archived; of all or of `only` some; in one state; with runs that are held;
     whose id, friction material or fluid contains `find`, whatever its case."""
 
@@ -81,7 +81,7 @@ def get(connection: Connection, clutch_id: str) -> ClutchRow | None:
 
 def page(
     connection: Connection,
-    choice: Choice = Choice(),
+    choice: ClutchSelection = ClutchSelection(),
     *,
     limit: int | None,
     after: tuple[float, str] | None = None,
@@ -122,7 +122,7 @@ def _whole_or_damaged(of: Callable[[Any], ClutchRow], row: Any) -> ClutchRow:
         )
 
 
-def counts(connection: Connection, choice: Choice) -> Counts:
+def counts(connection: Connection, choice: ClutchSelection) -> Counts:
     by_state = _chosen(select(clutch.c.state, func.count()), choice).group_by(clutch.c.state)
     return Counts(
         states={state: int(number) for state, number in connection.execute(by_state)},
@@ -130,7 +130,7 @@ def counts(connection: Connection, choice: Choice) -> Counts:
     )
 
 
-def at_rank(connection: Connection, choice: Choice, share: float, *, below: float) -> ClutchRow | None:
+def at_rank(connection: Connection, choice: ClutchSelection, share: float, *, below: float) -> ClutchRow | None:
     """The clutch that this share of a choice is worse than, of those with a rank between 0 and `below`; None without any."""
     ranked = (clutch.c.rank > 0, clutch.c.rank < below)
     number: int = connection.execute(_chosen(_number, choice).where(*ranked)).scalar_one()
@@ -139,7 +139,7 @@ def at_rank(connection: Connection, choice: Choice, share: float, *, below: floa
     return None if clutch_id is None else get(connection, clutch_id)
 
 
-def _chosen(query: Select[Any], choice: Choice) -> Select[Any]:
+def _chosen(query: Select[Any], choice: ClutchSelection) -> Select[Any]:
     """A query of a choice's clutches alone."""
     query = query.where(clutch.c.archived == int(choice.archived))
     if choice.only is not None:

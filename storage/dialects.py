@@ -33,7 +33,7 @@ NUMBER: TypeEngine[float] = sa.REAL().with_variant(_NumberOrNull(), "postgresql"
 WHOLE = sa.Integer().with_variant(sa.BigInteger(), "postgresql")
 
 
-class Pair(FunctionElement[Any]):
+class DialectPair(FunctionElement[Any]):
     """An expression as SQLite knows it, and the same as PostgreSQL does."""
 
     inherit_cache = True
@@ -43,39 +43,39 @@ class Pair(FunctionElement[Any]):
         self.type = of_postgresql.type
 
 
-@compiles(Pair, "sqlite")
-def _as_sqlite(pair: Pair, compiler: SQLCompiler, **options: Any) -> str:
+@compiles(DialectPair, "sqlite")
+def _as_sqlite(pair: DialectPair, compiler: SQLCompiler, **options: Any) -> str:
     return compiler.process(pair.clauses.clauses[0], **options)
 
 
-@compiles(Pair, "postgresql")
-def _as_postgresql(pair: Pair, compiler: SQLCompiler, **options: Any) -> str:
+@compiles(DialectPair, "postgresql")
+def _as_postgresql(pair: DialectPair, compiler: SQLCompiler, **options: Any) -> str:
     return compiler.process(pair.clauses.clauses[1], **options)
 
 
 def json_value(column: sa.ColumnElement[str], *path: str | int) -> sa.ColumnElement[Any]:
     """The value at `path` of the JSON in a text column, as Python has it; None where there is none. No list, no object."""
     of_postgresql = sa.cast(column, sa.JSON).op("#>", return_type=NullType())(_array(path))  # the driver decodes it
-    return Pair(sa.func.json_extract(column, _sqlite_path(path)), of_postgresql)
+    return DialectPair(sa.func.json_extract(column, _sqlite_path(path)), of_postgresql)
 
 
 def json_text(column: sa.ColumnElement[str], *path: str | int) -> sa.ColumnElement[str]:
     """The text at `path` of the JSON in a text column, to be compared; NULL where there is none."""
     of_postgresql = sa.cast(column, sa.JSON).op("#>>", return_type=sa.Text())(_array(path))
-    return Pair(sa.func.json_extract(column, _sqlite_path(path)), of_postgresql)
+    return DialectPair(sa.func.json_extract(column, _sqlite_path(path)), of_postgresql)
 
 
 def json_fields(column: sa.ColumnElement[str], *names: str) -> sa.ColumnElement[str]:
     """JSON text with these fields, lists and objects too, of the JSON in a text column; null where it has none."""
     of_sqlite = [part for name in names for part in (name, sa.func.json_extract(column, _sqlite_path((name,))))]
     of_postgresql = [part for name in names for part in (name, sa.cast(column, sa.JSON).op("#>")(_array((name,))))]
-    return Pair(sa.func.json_object(*of_sqlite), sa.cast(sa.func.json_build_object(*of_postgresql), sa.Text))
+    return DialectPair(sa.func.json_object(*of_sqlite), sa.cast(sa.func.json_build_object(*of_postgresql), sa.Text))
 
 
 def json_length(column: sa.ColumnElement[str], *path: str) -> sa.ColumnElement[int]:
     """How many items the list at `path` of the JSON in a text column has; NULL where there is none."""
     of_postgresql = sa.func.json_array_length(sa.cast(column, sa.JSON).op("#>")(_array(path)), type_=sa.Integer)
-    return Pair(sa.func.json_array_length(column, _sqlite_path(path)), of_postgresql)
+    return DialectPair(sa.func.json_array_length(column, _sqlite_path(path)), of_postgresql)
 
 
 def among(column: sa.ColumnElement[Any], wanted: Sequence[str | int]) -> sa.ColumnElement[bool]:
@@ -83,13 +83,13 @@ def among(column: sa.ColumnElement[Any], wanted: Sequence[str | int]) -> sa.Colu
     parameter_list = sa.literal(json.dumps(list(wanted), ensure_ascii=False), sa.Text)
     of_sqlite = sa.func.json_each(parameter_list).table_valued("value").c.value
     of_postgresql = sa.func.json_array_elements_text(sa.cast(parameter_list, sa.JSON)).table_valued("value").c.value
-    return Pair(column.in_(sa.select(of_sqlite)), column.in_(sa.select(sa.cast(of_postgresql, column.type))))
+    return DialectPair(column.in_(sa.select(of_sqlite)), column.in_(sa.select(sa.cast(of_postgresql, column.type))))
 
 
 def now_in_seconds() -> sa.ColumnElement[float]:
     """Seconds since 1970 by the clock of the database, which is one for all processes that use it."""
     of_sqlite = (sa.func.julianday("now") - 2440587.5) * 86400.0
-    return Pair(of_sqlite, sa.cast(sa.func.extract("epoch", sa.func.clock_timestamp()), sa.Double))
+    return DialectPair(of_sqlite, sa.cast(sa.func.extract("epoch", sa.func.clock_timestamp()), sa.Double))
 
 
 def newest_first(

@@ -10,7 +10,7 @@ from typing import Any
 from sqlalchemy import ColumnElement, Connection, Select, TextClause, and_, exists, func, select, tuple_
 
 from storage.checksums import amend
-from storage.dialects import Pair, json_text, json_value
+from storage.dialects import DialectPair, json_text, json_value
 from storage.encoding import Json, Rows
 from storage.tables import HELD_ONLY, fit, run
 
@@ -219,7 +219,7 @@ def held(connection: Connection, clutch_ids: Sequence[str]) -> dict[str, int]:
 
 def count(connection: Connection) -> int:
     # of SQLite's keys none is left out: the greatest one counts the runs, for none is ever deleted
-    number = Pair(func.coalesce(func.max(run.c.run_key), 0), func.count(run.c.run_key))
+    number = DialectPair(func.coalesce(func.max(run.c.run_key), 0), func.count(run.c.run_key))
     return int(connection.execute(select(number)).scalar_one())
 
 

@@ -110,7 +110,7 @@ raw_removal = Table(
 IN_A_STORE = text("blob IS NOT NULL")
 
 #: An encoded column is in `data`, or it is the `blob` of that name (its SHA-256) in a store, and `data` is empty. The file
-#: that a run was read from is a row too, under a name that no channel has (`storage.channels.FILE`).
+#: that a run was read from is a row too, under a name that no channel has (`storage.raw_columns.FILE`).
 channel = Table(
     "channel",
     metadata,

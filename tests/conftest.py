@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, settings
 
-from service.work import process
+from service.jobs import process
 from storage.blobs.stores import open_store
 from storage.engine.database import Database
 from storage.engine.opening import open_database

@@ -5,9 +5,9 @@ import math
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
-from models.tracking.linear_model import Points
+from models.tracking.linear_model import EvaluationPoints
 from models.tracking.measurement import Measurement
-from models.tracking.prior import Prior
+from models.tracking.prior import TrackPrior
 
 
 def integrated(progress: np.ndarray) -> np.ndarray:
@@ -24,7 +24,9 @@ def integrated(progress: np.ndarray) -> np.ndarray:
     return np.array(courses).T @ np.array(courses)
 
 
-def normal(prior: Prior, measurements: list[Measurement], points: Points) -> tuple[np.ndarray, np.ndarray]:
+def normal(
+    prior: TrackPrior, measurements: list[Measurement], points: EvaluationPoints
+) -> tuple[np.ndarray, np.ndarray]:
     """Mean [n, t] and covariance [n, t, t] of the measurements at n points, all linear terms integrated out."""
     columns = (np.array([getattr(m, name) for m in measurements], dtype=float) for name in NAMES)
     progress, variance, epoch, new_levels = columns
@@ -55,7 +57,7 @@ def normal(prior: Prior, measurements: list[Measurement], points: Points) -> tup
 NAMES = ("progress", "variance", "epoch", "new_levels")
 
 
-def log_likelihood(prior: Prior, measurements: list[Measurement], points: Points) -> np.ndarray:
+def log_likelihood(prior: TrackPrior, measurements: list[Measurement], points: EvaluationPoints) -> np.ndarray:
     """Log probability of the measurements at n points [n]."""
     mean, covariance = normal(prior, measurements, points)
     value = np.array([m.value for m in measurements])

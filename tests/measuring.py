@@ -12,8 +12,8 @@ from typing import Any, TypeVar
 from rich.console import Console
 from scipy.stats import binomtest
 
-from service.work.executor import executor_of
-from service.work.progress import progress
+from service.jobs.executor import executor_of
+from service.jobs.progress import progress
 
 Job = TypeVar("Job")
 Result = TypeVar("Result")

@@ -27,7 +27,7 @@ import httpx2
 import numpy as np
 import pytest
 
-from service.work import process
+from service.jobs import process
 from tests.storage.samples import lay_empty
 
 
@@ -121,8 +121,8 @@ _LOADED.set_forkserver_preload(
         "service.cli.demo.demo",
         "service.cli.main",
         "service.cli.serving.services",
-        "service.work.diagnosis",
-        "service.workflows.replay",
+        "service.jobs.diagnosis",
+        "service.changes.replay",
         "uvicorn.protocols.http.httptools_impl",
     ]
 )
@@ -205,7 +205,7 @@ class _Forked:
         self._process.kill()
 
 
-#: In place of `subprocess` in `service.work.process`.
+#: In place of `subprocess` in `service.jobs.process`.
 FORKING = SimpleNamespace(Popen=_Forked, PIPE=subprocess.PIPE, TimeoutExpired=subprocess.TimeoutExpired)
 
 
@@ -217,7 +217,7 @@ def _run_module(arguments: list[str], environment: dict[str, str], files: list[i
     gc.freeze()
     warnings.simplefilter("ignore")
     warnings.simplefilter("default", RuntimeWarning)
-    for name in ("service.work.background", "service.work.diagnosis", "service.work.workflow"):
+    for name in ("service.jobs.background", "service.jobs.diagnosis", "service.jobs.change"):
         sys.modules.pop(name, None)  # it is run as if it had not been loaded
     sys.argv = arguments
     runpy.run_module(arguments[0], run_name="__main__", alter_sys=True)

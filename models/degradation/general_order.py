@@ -24,7 +24,7 @@ ENDED, LOG_MOST = 1e-12, math.log(1e3)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Degradation:
+class DegradationLaw:
     """The coefficients of eq. 6, floats or arrays that broadcast against each other.
 
     `initial` ξ0 and `change` Δ are in the unit of the quantity, `scale` φ in that of ζ (cycles), `exponent` ε [-]. Both are
@@ -61,13 +61,13 @@ def progress_fraction(zeta: Number, scale: Number, exponent: Number) -> FloatArr
     )
 
 
-def value(zeta: Number, degradation: Degradation) -> FloatArray:
+def value(zeta: Number, degradation: DegradationLaw) -> FloatArray:
     """Eq. 6, ξ(ζ) in the unit of ξ0; ζ >= 0 broadcasts against the coefficients."""
     d = degradation
     return np.asarray(d.initial + d.change * progress_fraction(zeta, d.scale, d.exponent))
 
 
-def first_passage(level: Number, degradation: Degradation) -> FloatArray:
+def first_passage(level: Number, degradation: DegradationLaw) -> FloatArray:
     """The ζ at which ξ is `level`: φ [(1 - (level - ξ0)/Δ)^(-1/ε) - 1], or inf where eq. 6 never takes that value.
 
     It is monotone, so there is at most one such ζ; a constant (Δ = 0) is at its level from ζ = 0 on. Also inf where ζ
@@ -83,7 +83,7 @@ def first_passage(level: Number, degradation: Degradation) -> FloatArray:
         return np.where(inside, d.scale * growth, np.inf)
 
 
-def reaches(level: Number, degradation: Degradation) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
+def reaches(level: Number, degradation: DegradationLaw) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
     """Whether eq. 6 ever takes the value `level`: it starts there, or `level` lies between ξ0 and ξ0 + Δ
     (excluded)."""
     d = degradation

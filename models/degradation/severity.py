@@ -8,7 +8,7 @@ cycles are w times as severe as a reference cycle therefore counts w times:
 with N the duty cycles, w the sliding distance or the energy [J] of one cycle and q an exponent. The distance is given as
 an angle [rad]: the mean radius, the same in all of a clutch's cycles, cancels. ζ is still counted in cycles, those of the
 first block that states its severity. It is piecewise linear; beyond the last block it continues at the rate of recent
-duty, and so remaining cycles are cycles of recent duty; or by a planned `Programme` of blocks that is run over and over.
+duty, and so remaining cycles are cycles of recent duty; or by a planned `DutyProgramme` of blocks that is run over and over.
 The work of a planned block may be uncertain, and is then log-normal, the same at every pass of the programme.
 
 Source: Ompusunggu, Janssens, Sas, ISRN Tribology 2013, 607279, eq. 6; J. F. Archard, J. Appl. Phys. 24 (1953) 981-988, for
@@ -170,7 +170,7 @@ def _recent(lengths: FloatArray, rates: FloatArray) -> float:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Programme:
+class DutyProgramme:
     """Blocks of `cycles` [b] > 0, and what a cycle of each adds to ζ [n, b] > 0, by draw.
 
     Raises ValueError where there is no block or a number is not positive.

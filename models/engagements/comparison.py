@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.arrays import FloatArray
-from models.engagements.slip import Estimate
+from models.engagements.slip import ValueWithError
 
 #: Points of a kept course of speed. Chosen: a course that is kept is some 600 bytes.
 COURSE_POINTS = 65
@@ -33,7 +33,7 @@ class SpeedCourse:
     """The speed of one slip [65] rad/s at equal steps from contact to its end, or the mean of several [50]; `duration` [s]
     of that, `noise` [rad/s] the deviation of a point."""
 
-    duration: Estimate
+    duration: ValueWithError
     speed: FloatArray
     noise: float
 
@@ -51,9 +51,9 @@ class SpeedCourse:
 class Comparison:
     """The three indicators; `spectral_angle` in rad, the others without a unit."""
 
-    normalised_duration: Estimate
-    euclidean_distance: Estimate
-    spectral_angle: Estimate
+    normalised_duration: ValueWithError
+    euclidean_distance: ValueWithError
+    spectral_angle: ValueWithError
 
 
 def reference_of(courses: Sequence[SpeedCourse]) -> SpeedCourse:
@@ -61,7 +61,7 @@ def reference_of(courses: Sequence[SpeedCourse]) -> SpeedCourse:
     if not courses:
         raise ValueError("a reference needs at least one engagement, got none")
     count = len(courses)
-    mean = Estimate(
+    mean = ValueWithError(
         value=sum(course.duration.value for course in courses) / count,
         sd=math.hypot(*(course.duration.sd for course in courses)) / count,
     )
@@ -83,9 +83,9 @@ def compared(course: SpeedCourse, reference: SpeedCourse) -> Comparison:
     ratio = course.duration.value / reference.duration.value
     ratio_sd = math.hypot(course.duration.sd, ratio * reference.duration.sd) / reference.duration.value
     return Comparison(
-        normalised_duration=Estimate(value=ratio, sd=ratio_sd),
-        euclidean_distance=Estimate(value=float(np.linalg.norm(x - r)) / measured_size, sd=error / measured_size),
-        spectral_angle=Estimate(value=math.acos(min(max(cosine, -1.0), 1.0)), sd=error / size),
+        normalised_duration=ValueWithError(value=ratio, sd=ratio_sd),
+        euclidean_distance=ValueWithError(value=float(np.linalg.norm(x - r)) / measured_size, sd=error / measured_size),
+        spectral_angle=ValueWithError(value=math.acos(min(max(cosine, -1.0), 1.0)), sd=error / size),
     )
 
 

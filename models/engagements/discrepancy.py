@@ -18,9 +18,9 @@ import numpy as np
 from models.arrays import FloatArray
 from models.engagements.comparison import bin_means
 from models.engagements.criteria import ENDPOINT, INITIAL
-from models.engagements.measured import MeasuredEngagement
+from models.engagements.measured import EngagementIndicators
 from models.engagements.simulation import Capacity, Drive, Engagement, engage
-from models.engagements.slip import Estimate, Refusal, Slip, slip_of
+from models.engagements.slip import Refusal, SlipRecord, ValueWithError, slip_of
 from models.records.runs import Record
 
 
@@ -40,7 +40,7 @@ class RecordedPressure:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Discrepancy:
+class EngagementDiscrepancy:
     """`trace` is the simulated engagement on the record's clock, `torque_share` [-] the discrepancy of torque;
     `simulated_stop_time` [s] and `stop_time_difference` [s] are None where the simulated clutch slips on."""
 
@@ -48,12 +48,12 @@ class Discrepancy:
     drive: Drive
     torque_share: float
     simulated_stop_time: float | None
-    stop_time_difference: Estimate | None
+    stop_time_difference: ValueWithError | None
 
 
 def discrepancy(
-    engagement: MeasuredEngagement, capacity: Capacity, mean_radius: float, moments: int = 100
-) -> Discrepancy | None:
+    engagement: EngagementIndicators, capacity: Capacity, mean_radius: float, moments: int = 100
+) -> EngagementDiscrepancy | None:
     """A measured engagement against a clutch of this capacity, torques compared at so many moments of the slip; None where
     the record does not show what slowed the shaft."""
     slip = engagement.slip
@@ -75,16 +75,16 @@ def discrepancy(
     inside = slice(1, -1)  # a bin at an end reaches beyond the slip
     error, values = measured[inside] - modelled[inside], measured[inside]
     of_stop = engagement.stop_time
-    return Discrepancy(
+    return EngagementDiscrepancy(
         trace=replace(trace, time=trace.time + origin),
         drive=drive,
         torque_share=math.sqrt(float(error @ error) / float(values @ values)),
         simulated_stop_time=stop,
-        stop_time_difference=None if stop is None else Estimate(value=of_stop.value - stop, sd=of_stop.sd),
+        stop_time_difference=None if stop is None else ValueWithError(value=of_stop.value - stop, sd=of_stop.sd),
     )
 
 
-def _drive_of(slip: Slip, speed: float) -> Drive | None:
+def _drive_of(slip: SlipRecord, speed: float) -> Drive | None:
     """The drive of a record; None where the shaft was not slowed by the clutch's torque."""
     until = slip.time[-1] if slip.again is None else slip.again
     sticking_torque = slip.torque[slip.between(slip.end.value + 2 * slip.end.sd, float(until))]
@@ -100,7 +100,7 @@ def _drive_of(slip: Slip, speed: float) -> Drive | None:
     return Drive(speed=speed, limit=limit, inertia=inertia, drag=0.0) if inertia > 0 else None
 
 
-def _profile_of(slip: Slip, maximum: float, origin: float, duration: float, moments: int) -> RecordedPressure:
+def _profile_of(slip: SlipRecord, maximum: float, origin: float, duration: float, moments: int) -> RecordedPressure:
     before = slip.pressure[slip.between(origin, slip.contact)]
     plateau = float(np.median(before)) if before.size else 0.0
     last = float(slip.time[-1])

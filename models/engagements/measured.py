@@ -25,37 +25,37 @@ from models.arrays import FloatArray
 from models.clutch import Geometry
 from models.engagements import criteria
 from models.engagements.comparison import COURSE_POINTS, SpeedCourse, bin_means
-from models.engagements.slip import Channel, Estimate, Refusal, Slip, channel_of, crossing, slip_of
+from models.engagements.slip import Refusal, SensorChannel, SlipRecord, ValueWithError, channel_of, crossing, slip_of
 from models.records.criteria import UNLOADED
 from models.records.runs import Record
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class MeasuredEngagement:
+class EngagementIndicators:
     """One engagement. Times in s of the record's clock, stop_time s, energy J, peak_power W, speeds rad/s, pressures Pa,
     all others without a unit; None where the record does not determine it.
 
     `course` is the slip's speed over time, for comparison with other engagements.
     """
 
-    slip: Slip
-    initial_speed: Estimate
+    slip: SlipRecord
+    initial_speed: ValueWithError
     maximum_pressure: float
-    stop_time: Estimate
-    energy: Estimate
-    peak_power: Estimate | None
-    initial_cof: Estimate | None
-    midpoint_cof: Estimate | None
-    endpoint_cof: Estimate | None
-    breakaway_cof: Estimate | None
-    initial_ratio: Estimate | None
-    endpoint_ratio: Estimate | None
-    breakaway_ratio: Estimate | None
-    torque_rise: Estimate | None
+    stop_time: ValueWithError
+    energy: ValueWithError
+    peak_power: ValueWithError | None
+    initial_cof: ValueWithError | None
+    midpoint_cof: ValueWithError | None
+    endpoint_cof: ValueWithError | None
+    breakaway_cof: ValueWithError | None
+    initial_ratio: ValueWithError | None
+    endpoint_ratio: ValueWithError | None
+    breakaway_ratio: ValueWithError | None
+    torque_rise: ValueWithError | None
     course: SpeedCourse
 
 
-def measured_engagement(record: Record, geometry: Geometry) -> MeasuredEngagement | Refusal:
+def measured_engagement(record: Record, geometry: Geometry) -> EngagementIndicators | Refusal:
     """The indicators of a record of one engagement, or why it has none."""
     slip = slip_of(record)
     if isinstance(slip, Refusal):
@@ -70,7 +70,7 @@ def measured_engagement(record: Record, geometry: Geometry) -> MeasuredEngagemen
     breakaway = _breakaway(slip, channels, per_pascal)
     at_midpoint = channels.moment(criteria.MIDPOINT * speed.value)
     rise = _ratio(*(channels.torque.at(moment, channels.width) for moment in (slip.end.value, at_midpoint)))
-    return MeasuredEngagement(
+    return EngagementIndicators(
         slip=slip,
         initial_speed=speed,
         maximum_pressure=float(np.quantile(channels.pressure.values, 0.98)),  # a spike is none
@@ -84,12 +84,12 @@ def measured_engagement(record: Record, geometry: Geometry) -> MeasuredEngagemen
         initial_ratio=_ratio(initial, midpoint),
         endpoint_ratio=_ratio(endpoint, midpoint),
         breakaway_ratio=_ratio(breakaway, midpoint),
-        torque_rise=None if rise is None else Estimate(value=rise.value - 1, sd=rise.sd),
+        torque_rise=None if rise is None else ValueWithError(value=rise.value - 1, sd=rise.sd),
         course=_course(slip, channels),
     )
 
 
-def trace_times(slip: Slip) -> FloatArray:
+def trace_times(slip: SlipRecord) -> FloatArray:
     """Equally spaced times [m] s at which a slip's trace is shown: from before contact to after the standstill."""
     duration = slip.end.value - slip.contact
     first = max(slip.contact - 0.2 * duration, float(slip.time[0]))
@@ -99,7 +99,7 @@ def trace_times(slip: Slip) -> FloatArray:
 class _Channels:
     """The channels of a slip, from contact to where it surely has not ended yet."""
 
-    def __init__(self, slip: Slip, per_pascal: float) -> None:
+    def __init__(self, slip: SlipRecord, per_pascal: float) -> None:
         rows = slip.between(slip.contact, slip.end.value - 2 * slip.end.sd)
         time = slip.time[rows]
         self.slip = slip
@@ -110,31 +110,33 @@ class _Channels:
         )
         self.friction = _friction(slip, per_pascal, rows)
 
-    def initial_speed(self) -> Estimate:
+    def initial_speed(self) -> ValueWithError:
         """The speed at contact: the mean over the quarter of the slip's duration before contact; where fewer than 3 samples
         lie there, the speed when the slip begins; where that cannot be fitted, the highest speed."""
         slip = self.slip
         before = slip.speed[slip.between(slip.contact - 0.25 * (slip.end.value - slip.contact), slip.contact)]
         if before.size >= 3:
-            return Estimate(value=float(before.mean()), sd=float(before.std(ddof=1)) / math.sqrt(before.size))
+            return ValueWithError(value=float(before.mean()), sd=float(before.std(ddof=1)) / math.sqrt(before.size))
         first = self.speed.at(float(self.speed.time[0]), self.width)
-        return Estimate(value=float(self.speed.values.max()), sd=self.noise(self.speed)) if first is None else first
+        return (
+            ValueWithError(value=float(self.speed.values.max()), sd=self.noise(self.speed)) if first is None else first
+        )
 
     def moment(self, speed: float) -> float:
         """When the shaft has come down to a speed [rad/s]: the moment that leaves the fewest samples on the wrong side."""
         return crossing(self.speed.time, self.speed.values <= speed)
 
-    def cof(self, moment: float) -> Estimate | None:
+    def cof(self, moment: float) -> ValueWithError | None:
         """μ at a moment of the slip [s]."""
         return None if self.friction is None else self.friction.at(moment, self.width)
 
-    def noise(self, channel: Channel) -> float:
+    def noise(self, channel: SensorChannel) -> float:
         """The deviation of a sample, by differences of second order."""
         second = np.diff(channel.values, 2)
         return float(np.sqrt(np.mean(second**2) / 6))
 
 
-def _friction(slip: Slip, per_pascal: float, rows: NDArray[np.bool_]) -> Channel | None:
+def _friction(slip: SlipRecord, per_pascal: float, rows: NDArray[np.bool_]) -> SensorChannel | None:
     """μ of every sample under load; `per_pascal` [Nm/Pa] is the torque of a unit μ."""
     loaded = rows & (slip.pressure >= UNLOADED)
     if not loaded.any():
@@ -142,11 +144,11 @@ def _friction(slip: Slip, per_pascal: float, rows: NDArray[np.bool_]) -> Channel
     return channel_of(slip.time[loaded], slip.torque[loaded] / (per_pascal * slip.pressure[loaded]))
 
 
-def _ratio(value: Estimate | None, reference: Estimate | None) -> Estimate | None:
+def _ratio(value: ValueWithError | None, reference: ValueWithError | None) -> ValueWithError | None:
     return None if value is None or reference is None else value.over(reference)
 
 
-def _energy(slip: Slip, channels: _Channels) -> Estimate:
+def _energy(slip: SlipRecord, channels: _Channels) -> ValueWithError:
     """The trapezoid of power; from contact to the first sample power is that sample's, at the end of slip it is zero."""
     rows = slip.between(slip.contact, slip.end.value)
     torque, speed = slip.torque[rows], slip.speed[rows]
@@ -160,10 +162,10 @@ def _energy(slip: Slip, channels: _Channels) -> Estimate:
         slip.open_torque.sd * float(weight @ speed),
         slip.start.sd * float(torque[0] * speed[0]),
     )
-    return Estimate(value=float(weight @ (torque * speed)), sd=math.hypot(*deviations))
+    return ValueWithError(value=float(weight @ (torque * speed)), sd=math.hypot(*deviations))
 
 
-def _peak_power(slip: Slip) -> Estimate | None:
+def _peak_power(slip: SlipRecord) -> ValueWithError | None:
     rows = slip.between(slip.contact, slip.end.value)
     power = channel_of(slip.time[rows], (slip.torque * slip.speed)[rows])
     first, last = power.time[[0, -1]].tolist()
@@ -171,7 +173,7 @@ def _peak_power(slip: Slip) -> Estimate | None:
     return max((value for value in values if value is not None), key=lambda value: value.value, default=None)
 
 
-def _breakaway(slip: Slip, channels: _Channels, per_pascal: float) -> Estimate | None:
+def _breakaway(slip: SlipRecord, channels: _Channels, per_pascal: float) -> ValueWithError | None:
     """μ at the moment at which slip begins again, by the samples between the standstill and it."""
     if slip.again is None:
         return None
@@ -183,12 +185,12 @@ def _breakaway(slip: Slip, channels: _Channels, per_pascal: float) -> Estimate |
     return friction.at(slip.again, channels.width)
 
 
-def _course(slip: Slip, channels: _Channels) -> SpeedCourse:
+def _course(slip: SlipRecord, channels: _Channels) -> SpeedCourse:
     """Speed at equal steps from contact to the end of slip, each the mean over one step about it."""
     duration = slip.end.value - slip.contact
     at_once = max(channels.speed.values.size / COURSE_POINTS, 1.0)
     return SpeedCourse(
-        duration=Estimate(value=duration, sd=slip.duration.sd),
+        duration=ValueWithError(value=duration, sd=slip.duration.sd),
         speed=bin_means(slip.time, slip.speed, np.linspace(slip.contact, slip.end.value, COURSE_POINTS)),
         noise=channels.noise(channels.speed) * math.sqrt(channels.speed.inflation / at_once),
     )

@@ -51,7 +51,7 @@ def capacity_of(parameters: Mapping[float, StribeckParameters]) -> Capacity:
     return capacity
 
 
-class Profile(Protocol):
+class LinePressure(Protocol):
     """A course of line pressure: `contact` [s] is when the discs touch, at the pressure `plateau` [Pa]; `maximum` [Pa]."""
 
     @property
@@ -136,7 +136,7 @@ def engage(
     capacity: Capacity,
     mean_radius: float,
     *,
-    profile: Profile | None = None,
+    profile: LinePressure | None = None,
     drive: Drive | None = None,
     longest: float = 4.0,
     rate: float = 200.0,

@@ -62,29 +62,29 @@ class Refusal:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Estimate:
+class ValueWithError:
     """A value with its standard error, in the value's unit."""
 
     value: float
     sd: float
 
-    def over(self, other: "Estimate") -> "Estimate | None":
+    def over(self, other: "ValueWithError") -> "ValueWithError | None":
         """The ratio to another value, errors independent; None where that is not positive."""
         if other.value <= 0:
             return None
         ratio = self.value / other.value
-        return Estimate(value=ratio, sd=math.hypot(self.sd, ratio * other.sd) / other.value)
+        return ValueWithError(value=ratio, sd=math.hypot(self.sd, ratio * other.sd) / other.value)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Channel:
+class SensorChannel:
     """A channel: time [n] s ascending, values [n]; `inflation` f >= 1 of its noise."""
 
     time: FloatArray
     values: FloatArray
     inflation: float
 
-    def at(self, moment: float, half_width: float) -> Estimate | None:
+    def at(self, moment: float, half_width: float) -> ValueWithError | None:
         """The value at a moment [s] within the channel, by the samples within `half_width` [s] or, at an end, within twice
         that. None where too few lie near."""
         first, last = self.time[[0, -1]].tolist()
@@ -98,7 +98,7 @@ class Channel:
         return _fitted((self.time[rows] - moment) / width, self.values[rows], self.inflation)
 
 
-def channel_of(time: FloatArray, values: FloatArray, parts: int = 8, most: float = 0.9) -> Channel:
+def channel_of(time: FloatArray, values: FloatArray, parts: int = 8, most: float = 0.9) -> SensorChannel:
     """A channel whose noise is that of the residuals of parabolas through equal parts of it; its correlation is taken for
     `most` at most: with a factor of 19 no window holds samples enough."""
     before, after = [np.zeros(0)], [np.zeros(0)]
@@ -110,10 +110,10 @@ def channel_of(time: FloatArray, values: FloatArray, parts: int = 8, most: float
     first, second = np.concatenate(before), np.concatenate(after)
     power = float(first @ first)
     correlation = min(max(float(first @ second) / power, 0.0), most) if power > 0 else 0.0
-    return Channel(time=time, values=values, inflation=(1 + correlation) / (1 - correlation))
+    return SensorChannel(time=time, values=values, inflation=(1 + correlation) / (1 - correlation))
 
 
-def _fitted(moment: FloatArray, values: FloatArray, inflation: float) -> Estimate:
+def _fitted(moment: FloatArray, values: FloatArray, inflation: float) -> ValueWithError:
     """The value at 0 by a parabola through the samples at `moment` [n], or by a line where that serves."""
     design = np.stack([np.ones_like(moment), moment, moment**2], axis=1)
     estimate, curvature = _least_squares(design, values, inflation)
@@ -122,14 +122,15 @@ def _fitted(moment: FloatArray, values: FloatArray, inflation: float) -> Estimat
     return _least_squares(design[:, :2], values, inflation)[0]
 
 
-def _least_squares(design: FloatArray, values: FloatArray, inflation: float) -> tuple[Estimate, Estimate]:
+def _least_squares(design: FloatArray, values: FloatArray, inflation: float) -> tuple[ValueWithError, ValueWithError]:
     """The first and the last coefficient."""
     inverse = np.linalg.pinv(design.T @ design)
     coefficients = inverse @ (design.T @ values)
     residual = values - design @ coefficients
     variance = float(residual @ residual) / (values.size - design.shape[1]) * inflation
     first, last = (
-        Estimate(value=float(coefficients[i]), sd=math.sqrt(max(variance * float(inverse[i, i]), 0.0))) for i in (0, -1)
+        ValueWithError(value=float(coefficients[i]), sd=math.sqrt(max(variance * float(inverse[i, i]), 0.0)))
+        for i in (0, -1)
     )
     return first, last
 
@@ -142,7 +143,7 @@ class Standstill:
     fast: int
     slowing: int
     rest: int
-    end: Estimate
+    end: ValueWithError
     zero: float
     again: float | None
 
@@ -187,7 +188,7 @@ def _never_ends(reason: str) -> Refusal:
     return Refusal(status=SlipStatus.SLIP_NEVER_ENDS, message=rule)
 
 
-def _rest(time: FloatArray, speed: FloatArray, earliest: float, latest: float) -> tuple[Estimate, float]:
+def _rest(time: FloatArray, speed: FloatArray, earliest: float, latest: float) -> tuple[ValueWithError, float]:
     """The end of slip and the speed at standstill; 0 where the record holds no standstill to show it.
 
     The power of g rises from 2 for as long as that explains more than chance would.
@@ -207,7 +208,7 @@ def _rest(time: FloatArray, speed: FloatArray, earliest: float, latest: float) -
 class _Rest:
     """A fit of the shaft's way to rest: its sum of squares and degrees of freedom."""
 
-    end: Estimate
+    end: ValueWithError
     zero: float
     misfit: float
     freedom: int
@@ -237,7 +238,7 @@ def _rest_of(power: int, time: FloatArray, speed: FloatArray, earliest: float, l
     freedom = max(time.size - jacobian.shape[1], 1)
     variance = misfit(end) / freedom * float(np.linalg.pinv(jacobian.T @ jacobian)[-1, -1])
     return _Rest(
-        end=Estimate(value=end, sd=math.sqrt(max(variance, 0.0))),
+        end=ValueWithError(value=end, sd=math.sqrt(max(variance, 0.0))),
         zero=float(coefficients[0]) if rows.shape[1] > power else 0.0,
         misfit=misfit(end),
         freedom=freedom,
@@ -245,7 +246,7 @@ def _rest_of(power: int, time: FloatArray, speed: FloatArray, earliest: float, l
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Slip:
+class SlipRecord:
     """An engagement's record freed of its sensors' zeros: time [n] s, pressure [n] Pa, speed [n] rad/s, torque [n] Nm, and
     where it slips: contact [s], start and end [s], and the zero of torque [Nm].
 
@@ -257,22 +258,22 @@ class Slip:
     speed: FloatArray
     torque: FloatArray
     contact: float
-    start: Estimate
-    end: Estimate
-    open_torque: Estimate
+    start: ValueWithError
+    end: ValueWithError
+    open_torque: ValueWithError
     again: float | None
 
     @property
-    def duration(self) -> Estimate:
+    def duration(self) -> ValueWithError:
         """Duration from start to end of slip [s]."""
-        return Estimate(value=self.end.value - self.start.value, sd=math.hypot(self.start.sd, self.end.sd))
+        return ValueWithError(value=self.end.value - self.start.value, sd=math.hypot(self.start.sd, self.end.sd))
 
     def between(self, low: float, high: float) -> NDArray[np.bool_]:
         """Which samples [n] lie from `low` to `high` [s], both included."""
         return (self.time >= low) & (self.time <= high)
 
 
-def slip_of(record: Record) -> Slip | Refusal:
+def slip_of(record: Record) -> SlipRecord | Refusal:
     """The slip of a record of one engagement, the first where it holds several."""
     refusal = _unusable(record)
     if refusal is not None:
@@ -298,7 +299,7 @@ def slip_of(record: Record) -> Slip | Refusal:
         most = 100 * criteria.LONGEST_GAP
         rule = f"samples are missing for {gap:.3g} s of a slip of {duration:.3g} s: record it without gaps above {most:g} %"
         return Refusal(status=SlipStatus.GAP, message=rule)
-    return Slip(
+    return SlipRecord(
         time=record.time,
         pressure=record.pressure,
         speed=speed - stop.zero,
@@ -347,8 +348,8 @@ class _Contact:
     """Contact and start of slip [s], and the torque [Nm] before contact."""
 
     contact: float
-    start: Estimate
-    zero: Estimate
+    start: ValueWithError
+    zero: ValueWithError
 
 
 def _contact_of(time: FloatArray, torque: FloatArray, slowing: int) -> _Contact | Refusal:
@@ -370,7 +371,7 @@ def _contact_of(time: FloatArray, torque: FloatArray, slowing: int) -> _Contact 
         open_rows = time < 2 * crossings[0] - crossings[1]
         if np.count_nonzero(open_rows) >= 3:
             quiet = torque[open_rows]
-            zero = Estimate(value=float(quiet.mean()), sd=float(quiet.std(ddof=1)) / math.sqrt(quiet.size))
+            zero = ValueWithError(value=float(quiet.mean()), sd=float(quiet.std(ddof=1)) / math.sqrt(quiet.size))
             return _start_of(time[rising], torque[rising] - zero.value, highest - zero.value, zero)
     rule = (
         "the record must begin before contact, with a torque near zero, "
@@ -394,11 +395,11 @@ def crossing(time: FloatArray, above: NDArray[np.bool_]) -> float:
     return float(time[max(row - 1, 0)] + time[min(row, time.size - 1)]) / 2
 
 
-def _start_of(time: FloatArray, torque: FloatArray, highest: float, zero: Estimate) -> _Contact:
+def _start_of(time: FloatArray, torque: FloatArray, highest: float, zero: ValueWithError) -> _Contact:
     below, start, above = _crossings(time, torque, highest)
     rows = (time >= below) & (time <= above)
     step = float(np.median(np.diff(time)))
-    estimate, contact = Estimate(value=start, sd=step / math.sqrt(12)), below
+    estimate, contact = ValueWithError(value=start, sd=step / math.sqrt(12)), below
     if np.count_nonzero(rows) >= 4:
         at, values = time[rows], torque[rows]
         middle = float(at.mean())
@@ -408,6 +409,6 @@ def _start_of(time: FloatArray, torque: FloatArray, highest: float, zero: Estima
             passed = middle + (criteria.START * highest - float(values.mean())) / slope
             variance = float(np.sum((values - values.mean() - slope * (at - middle)) ** 2)) / (at.size - 2)
             spread = 1 / at.size + (passed - middle) ** 2 / square
-            estimate = Estimate(value=passed, sd=math.sqrt(variance * spread) / slope)
+            estimate = ValueWithError(value=passed, sd=math.sqrt(variance * spread) / slope)
             contact = min(below, middle - float(values.mean()) / slope)
     return _Contact(contact=contact, start=estimate, zero=zero)

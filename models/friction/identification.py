@@ -31,7 +31,7 @@ is not too narrow.
 - Where values of V_S a factor e away lie within the 90 % interval of the profile, V_S is not determined, and the
   covariance is widened along the profile's direction up to them.
 
-All quantities are in the scaled units of `models.friction.variable_projection.Problem`.
+All quantities are in the scaled units of `models.friction.variable_projection.ProjectionProblem`.
 
 Source of HC2 and HC3: J. G. MacKinnon, H. White, J. Econometrics 29 (1985) 305-325.
 """
@@ -58,7 +58,7 @@ from models.friction.stribeck import (
     slope_gradient,
     torque,
 )
-from models.friction.variable_projection import Problem, Profile, jacobian, make_problem, minimise
+from models.friction.variable_projection import ProjectionProblem, VelocityProfile, jacobian, make_problem, minimise
 from models.records.runs import Curve
 
 #: An eigenvalue of JᵀJ below this share of the largest is rounding.
@@ -66,7 +66,7 @@ _ROUNDING = 1e-14
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Noise:
+class FitNoise:
     """sd [P] of a point of weight 1, widening [P]: Student's over the normal quantile, inflated [P], assumed [P].
 
     shaped [P]: part of the noise is taken to go with the torque, because deviations of the points were not given.
@@ -81,7 +81,7 @@ class Noise:
 
 def estimate_noise(
     residual: FloatArray, freedom: FloatArray, given_sd: FloatArray, level: FloatArray, disbelieved: float = 0.01
-) -> Noise:
+) -> FitNoise:
     """The noise of P curves from the weighted sum of squares [P], degrees of freedom [P] and given deviation [P], NaN where
     it is not given; `level` [P] is the root mean square torque.
 
@@ -93,7 +93,7 @@ def estimate_noise(
     inflated = is_given & estimable & (residual / given_sd**2 > chdtri(spare, disbelieved))
     estimated = (estimable & ~is_given) | inflated
     sd = np.where(estimated, np.sqrt(residual / spare), np.where(is_given, given_sd, criteria.ASSUMED_NOISE * level))
-    return Noise(
+    return FitNoise(
         sd=np.maximum(sd, 1e-6 * level),  # some noise there is
         widening=np.where(estimated, stdtrit(spare, 0.95) / criteria.Z90, 1.0),
         inflated=inflated,
@@ -113,7 +113,12 @@ class Uncertainty:
 
 
 def uncertainty(
-    problem: Problem, optimum: Profile, scan: Profile, noise: Noise, level: FloatArray, share: float = 0.5
+    problem: ProjectionProblem,
+    optimum: VelocityProfile,
+    scan: VelocityProfile,
+    noise: FitNoise,
+    level: FloatArray,
+    share: float = 0.5,
 ) -> Uncertainty:
     """Covariance of the optimum [P, 1] with a > 0, and which parameters the data do not determine: those with a standard
     error above a `share` of their scale, and V_S where values a factor e away are as likely as the 90 % interval allows."""
@@ -155,7 +160,9 @@ def _covariance(
     return np.asarray((covariance + covariance.swapaxes(1, 2)) / 2)
 
 
-def _shapes(problem: Problem, columns: FloatArray, optimum: Profile, noise: Noise) -> tuple[FloatArray, FloatArray]:
+def _shapes(
+    problem: ProjectionProblem, columns: FloatArray, optimum: VelocityProfile, noise: FitNoise
+) -> tuple[FloatArray, FloatArray]:
     """Variance of each point [P, n] over `noise.sd`²: its own r²/(1 - h)², and r²/(1 - h); both 1 where the deviations are
     given, the first wider where they were raised.
 
@@ -194,14 +201,14 @@ def _sandwich(columns: FloatArray, relative_variance: FloatArray, sd: FloatArray
     return np.asarray(inverse @ middle @ inverse)
 
 
-def _stray(optimum: Profile, scan: Profile, noise: Noise) -> FloatArray:
+def _stray(optimum: VelocityProfile, scan: VelocityProfile, noise: FitNoise) -> FloatArray:
     """How far [P] from the optimum, in log V_S, the profile still lies within the 90 % likelihood interval."""
     limit = optimum.residual + (criteria.Z90 * noise.widening * noise.sd)[:, None] ** 2
     distance = np.abs(scan.log_velocity - optimum.log_velocity)
     return np.asarray(np.where(scan.residual <= limit, distance, 0.0).max(axis=1))
 
 
-def _transform(problem: Problem, optimum: Profile) -> FloatArray:
+def _transform(problem: ProjectionProblem, optimum: VelocityProfile) -> FloatArray:
     """∂(M_s, M̄_c, V_S, C_v)/∂(a, b e_max, c, log V_S) [P, 4, 4]."""
     a, b = optimum.coefficients[:, 0, :2].T
     v_s = np.exp(optimum.log_velocity[:, 0])
@@ -214,7 +221,7 @@ def _transform(problem: Problem, optimum: Profile) -> FloatArray:
     return transform
 
 
-class FitStatus(StrEnum):
+class StribeckFitStatus(StrEnum):
     """DETERMINED; AT_BOUND: a parameter is zero; UNDETERMINED: the data do not determine some of them."""
 
     DETERMINED = "determined"
@@ -237,7 +244,7 @@ class StribeckFit:
     parameters: StribeckParameters
     covariance: FloatArray
     unbiased_covariance: FloatArray
-    status: FitStatus
+    status: StribeckFitStatus
     undetermined: tuple[str, ...]
     noise: float
     mse_percent: float | None
@@ -350,7 +357,7 @@ def _fit_batch(folded: Sequence[_Folded]) -> list[StribeckFit]:
     return [_describe(curve, row, optimum, bound, noise, uncertainties) for row, curve in enumerate(folded)]
 
 
-def _constant(problem: Problem, optimum: Profile, single: NDArray[np.bool_]) -> Profile:
+def _constant(problem: ProjectionProblem, optimum: VelocityProfile, single: NDArray[np.bool_]) -> VelocityProfile:
     """At a single speed four parameters fit a mean: M_s is that mean, M̄_c = 1, V_S that speed, C_v = 0."""
     if not single.any():
         return optimum
@@ -367,7 +374,7 @@ def _constant(problem: Problem, optimum: Profile, single: NDArray[np.bool_]) -> 
     )
 
 
-def _at_bound(optimum: Profile, level: FloatArray) -> tuple[Profile, NDArray[np.bool_]]:
+def _at_bound(optimum: VelocityProfile, level: FloatArray) -> tuple[VelocityProfile, NDArray[np.bool_]]:
     """The optimum with M_s lifted off zero, and which of M_s, M̄_c, C_v are zero [P, 3]."""
     coefficients = optimum.coefficients[:, 0]
     least = 1e-6 * level  # M̄_c = b/M_s must exist where the optimum has M_s = 0
@@ -377,7 +384,12 @@ def _at_bound(optimum: Profile, level: FloatArray) -> tuple[Profile, NDArray[np.
 
 
 def _describe(
-    folded: _Folded, row: int, optimum: Profile, bound: NDArray[np.bool_], noise: Noise, uncertainties: Uncertainty
+    folded: _Folded,
+    row: int,
+    optimum: VelocityProfile,
+    bound: NDArray[np.bool_],
+    noise: FitNoise,
+    uncertainties: Uncertainty,
 ) -> StribeckFit:
     a, b, c = optimum.coefficients[row, 0].tolist()
     v_s = math.exp(optimum.log_velocity[row, 0])
@@ -404,7 +416,11 @@ def _describe(
         parameters=parameters,
         covariance=covariance,
         unbiased_covariance=unbiased,
-        status=FitStatus.UNDETERMINED if undetermined else FitStatus.AT_BOUND if at_zero else FitStatus.DETERMINED,
+        status=StribeckFitStatus.UNDETERMINED
+        if undetermined
+        else StribeckFitStatus.AT_BOUND
+        if at_zero
+        else StribeckFitStatus.DETERMINED,
         undetermined=undetermined,
         noise=float(noise.sd[row]) * sd_share * folded.torque_scale,
         mse_percent=mse,
@@ -426,7 +442,9 @@ def _undetermined(folded: _Folded, too_wide: NDArray[np.bool_]) -> tuple[str, ..
     )
 
 
-def _message(folded: _Folded, undetermined: tuple[str, ...], at_zero: tuple[str, ...], noise: Noise, row: int) -> str:
+def _message(
+    folded: _Folded, undetermined: tuple[str, ...], at_zero: tuple[str, ...], noise: FitNoise, row: int
+) -> str:
     """A sentence or two for a person."""
     parts, names = [], ", ".join(undetermined)
     if undetermined and folded.distinct < len(PARAMETER_NAMES):

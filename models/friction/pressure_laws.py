@@ -23,7 +23,7 @@ from models.friction.stribeck import PARAMETER_NAMES, StribeckParameters
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class LinearLaw:
+class LinearPressureLaw:
     """α + β p: `intercept` in the parameter's unit, `slope` in that unit per Pa."""
 
     intercept: float
@@ -39,7 +39,7 @@ class LinearLaw:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class AsymptoticLaw:
+class AsymptoticPressureLaw:
     """c_∞ + a e^{-p/p_0}: `asymptote` and `excess` in the parameter's unit, `decay` p_0 in Pa."""
 
     asymptote: float
@@ -62,10 +62,10 @@ class AsymptoticLaw:
 class PressureLaws:
     """The four laws of one stationary test."""
 
-    static_torque: LinearLaw
-    coulomb_ratio: AsymptoticLaw
-    stribeck_velocity: LinearLaw
-    viscous_coefficient: LinearLaw
+    static_torque: LinearPressureLaw
+    coulomb_ratio: AsymptoticPressureLaw
+    stribeck_velocity: LinearPressureLaw
+    viscous_coefficient: LinearPressureLaw
 
     def parameters(self, pressure: FloatArray) -> StribeckParameters:
         """The Stribeck parameters at pressure [...] Pa, each at least 0."""
@@ -90,7 +90,7 @@ def law_covariances(fits: Sequence[StribeckFit], laws: PressureLaws) -> dict[str
 
 
 def law_covariance(
-    law: LinearLaw | AsymptoticLaw, pressure: FloatArray, value: FloatArray, deviation: FloatArray
+    law: LinearPressureLaw | AsymptoticPressureLaw, pressure: FloatArray, value: FloatArray, deviation: FloatArray
 ) -> FloatArray:
     """(JᵀWJ)⁻¹ max(1, χ²/ν) [k, k] of the k coefficients in their order.
 
@@ -133,15 +133,15 @@ def over_pressure(name: str, levels: FloatArray, values: FloatArray, pressures: 
     return np.stack([fit(levels, column, equal)(pressures) for column in values.T], axis=1)
 
 
-def fit_linear(pressure: FloatArray, value: FloatArray, deviation: FloatArray) -> LinearLaw:
+def fit_linear(pressure: FloatArray, value: FloatArray, deviation: FloatArray) -> LinearPressureLaw:
     """Weighted least squares line through value [n] at pressure [n] Pa, deviation [n] > 0, two pressures or more."""
     scale = float(pressure.max())
     columns = np.stack([np.ones_like(pressure), pressure / scale], axis=1) / deviation[:, None]
     intercept, slope = np.linalg.lstsq(columns, value / deviation, rcond=None)[0].tolist()
-    return LinearLaw(intercept=intercept, slope=slope / scale)
+    return LinearPressureLaw(intercept=intercept, slope=slope / scale)
 
 
-def fit_asymptotic(pressure: FloatArray, value: FloatArray, deviation: FloatArray) -> AsymptoticLaw:
+def fit_asymptotic(pressure: FloatArray, value: FloatArray, deviation: FloatArray) -> AsymptoticPressureLaw:
     """Weighted least squares in (c_∞, a) >= 0 and p_0, for value [n] at pressure [n] Pa, deviation [n] > 0.
 
     p_0 is scanned from 0.05 to 20 times the pressures' range, then refined between the best one's neighbours.
@@ -163,7 +163,9 @@ def fit_asymptotic(pressure: FloatArray, value: FloatArray, deviation: FloatArra
     log_decay = float(refined.x) if refined.fun <= solve(float(logs[best]))[1] else float(logs[best])
     (asymptote, at_least), _ = solve(log_decay)
     decay = span * float(np.exp(log_decay))
-    return AsymptoticLaw(asymptote=float(asymptote), excess=float(at_least * np.exp(least / decay)), decay=decay)
+    return AsymptoticPressureLaw(
+        asymptote=float(asymptote), excess=float(at_least * np.exp(least / decay)), decay=decay
+    )
 
 
 def _determined(fits: Sequence[StribeckFit], index: int) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -50,7 +50,7 @@ _MEMBERS = np.array([(3, 3), *((column, 3) for column in range(3)), *_PAIRS])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Problem:
+class ProjectionProblem:
     """P curves of up to n points, folded to v >= 0, scaled and padded.
 
     inverse_speed [P, n] and its least value fastest [P] (0 where all stand still), weight [P, n] = 1/sd (0: padding),
@@ -71,7 +71,7 @@ class Problem:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Profile:
+class VelocityProfile:
     """The non-negative least squares solution at each log V_S [P, K].
 
     coefficients [P, K, 3] of (1 - e, e/e_max, |v|^γ), residual [P, K]: the weighted sum of squares.
@@ -82,7 +82,7 @@ class Profile:
     residual: FloatArray
 
 
-def make_problem(speed: FloatArray, torque: FloatArray, weight: FloatArray) -> Problem:
+def make_problem(speed: FloatArray, torque: FloatArray, weight: FloatArray) -> ProjectionProblem:
     """Prepare P curves: speed [P, n] >= 0 as a share of the highest, torque [P, n], weight [P, n] (0: padding)."""
     moving = (weight > 0) & (speed > 0)
     fast = speed.max(axis=1, where=moving, initial=0.0)
@@ -92,7 +92,7 @@ def make_problem(speed: FloatArray, torque: FloatArray, weight: FloatArray) -> P
     floor = SLOWEST**2 / 100  # at a speed so low e is 0 for every V_S that is scanned, as it is at rest
     viscous, y = speed**GAMMA * weight, torque * weight
     basis, triangle = _orthonormal(weight, viscous)
-    return Problem(
+    return ProjectionProblem(
         inverse_speed=1 / np.where(moving, np.maximum(speed, floor), floor),
         fastest=np.where(still, 0.0, 1 / fast),
         weight=weight,
@@ -118,7 +118,7 @@ def _orthonormal(first: FloatArray, second: FloatArray) -> tuple[FloatArray, Flo
     return np.stack([q1, q2], axis=2), np.hstack([r11, r12, r22])
 
 
-def _decay(problem: Problem, log_velocity: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _decay(problem: ProjectionProblem, log_velocity: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Weighted z [P, K, n] at log V_S [P, K], V_S/v_max, and α, β, δ of 1 - e = α + β z and e/e_max = δ (1 + z)."""
     v_s = np.exp(log_velocity)
     peak = v_s * problem.fastest[:, None]
@@ -132,7 +132,7 @@ def _decay(problem: Problem, log_velocity: FloatArray) -> tuple[FloatArray, Floa
     return z, peak, np.stack([np.where(large, 1 - share, 0.0), -share, np.exp(np.where(large, 0.0, peak))], axis=2)
 
 
-def profile(problem: Problem, log_velocity: FloatArray) -> Profile:
+def profile(problem: ProjectionProblem, log_velocity: FloatArray) -> VelocityProfile:
     """Non-negative least squares in a, b, c at log V_S [P, K], all eight sets of columns compared."""
     z, peak, linear = _decay(problem, log_velocity)
     coefficients, residual, valid = _three_columns(problem, z, peak)
@@ -141,11 +141,11 @@ def profile(problem: Problem, log_velocity: FloatArray) -> Profile:
         curve = np.nonzero(negative)[0]
         fewer = _fewer_columns(problem, curve, z[negative], linear[negative])
         coefficients[negative], residual[negative] = fewer
-    return Profile(log_velocity=log_velocity, coefficients=coefficients, residual=residual)
+    return VelocityProfile(log_velocity=log_velocity, coefficients=coefficients, residual=residual)
 
 
 def _fewer_columns(
-    problem: Problem, curve: NDArray[np.intp], z: FloatArray, linear: FloatArray
+    problem: ProjectionProblem, curve: NDArray[np.intp], z: FloatArray, linear: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """The best of no, one and two columns for M cases z [M, n] of curve [M]: coefficients [M, 3], residual [M]."""
     weight, torque = problem.weight[curve], problem.torque[curve]
@@ -185,7 +185,7 @@ def _best_set(y: FloatArray, cosine: FloatArray) -> FloatArray:
 
 
 def _three_columns(
-    problem: Problem, z: FloatArray, peak: FloatArray
+    problem: ProjectionProblem, z: FloatArray, peak: FloatArray
 ) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
     """Least squares with all three columns, its residual summed as such, and where it is usable and not negative."""
     along = z @ problem.basis
@@ -206,7 +206,7 @@ def _three_columns(
     return np.stack([a, b, c], axis=2), np.einsum("pkn,pkn->pk", off, off), valid
 
 
-def minimise(problem: Problem) -> tuple[Profile, Profile]:
+def minimise(problem: ProjectionProblem) -> tuple[VelocityProfile, VelocityProfile]:
     """The global optimum [P, 1] and the scan [P, SCAN] over log V_S that found it.
 
     The lowest local minima of the scan are refined, and the best of them ends on a parabola's vertex.
@@ -235,7 +235,7 @@ def minimise(problem: Problem) -> tuple[Profile, Profile]:
     best = candidates.residual.argmin(axis=1)[:, None]
     tied = candidates.residual[:, 2:] <= candidates.residual.min(axis=1, keepdims=True) + _tolerance(problem)[:, None]
     best = np.where(tied, 2, best)
-    optimum = Profile(
+    optimum = VelocityProfile(
         log_velocity=np.take_along_axis(candidates.log_velocity, best, axis=1),
         coefficients=np.take_along_axis(candidates.coefficients, best[..., None], axis=1),
         residual=np.take_along_axis(candidates.residual, best, axis=1),
@@ -244,7 +244,7 @@ def minimise(problem: Problem) -> tuple[Profile, Profile]:
 
 
 def _bracket(
-    problem: Problem, centre: FloatArray, half: FloatArray, offsets: FloatArray
+    problem: ProjectionProblem, centre: FloatArray, half: FloatArray, offsets: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Values of log V_S at centre [P, M] + half [P] · offsets [N] and their residuals, each [P, M, N]."""
     points = centre[..., None] + half[:, None, None] * offsets
@@ -252,12 +252,12 @@ def _bracket(
     return points, profile(problem, points.reshape(len(half), -1)).residual.reshape(points.shape)
 
 
-def _tolerance(problem: Problem) -> FloatArray:
+def _tolerance(problem: ProjectionProblem) -> FloatArray:
     """Residuals within this of each other [P] are equal: V_S does not matter there."""
     return np.asarray(1e-13 * (problem.torque**2).sum(axis=1))
 
 
-def _tie(problem: Problem, scan: Profile, lowest: FloatArray) -> FloatArray:
+def _tie(problem: ProjectionProblem, scan: VelocityProfile, lowest: FloatArray) -> FloatArray:
     """Of the scanned log V_S that tie with the lowest residual [P] that nearest to the middle of the speeds, [P, 1].
 
     Where none ties (V_S matters), the middle itself.
@@ -284,7 +284,7 @@ def _narrow(points: FloatArray, f: FloatArray) -> tuple[FloatArray, FloatArray, 
     return lowest, vertex, np.maximum(right - vertex, vertex - left)
 
 
-def jacobian(problem: Problem, optimum: Profile) -> FloatArray:
+def jacobian(problem: ProjectionProblem, optimum: VelocityProfile) -> FloatArray:
     """Weighted derivatives [P, n, 4] of the torque to a, b e_max, c and log V_S at an optimum [P, 1].
 
     The last is taken at constant b e_max: b e_max (e/e_max) (V_S/v_max - V_S/v) + a e V_S/v.

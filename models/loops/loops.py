@@ -25,7 +25,7 @@ from models.records.runs import Record
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Loop:
+class FrictionLoop:
     """One pressure of a dynamic test; `pressure` [Pa] names the level.
 
     frequency [Hz], periods, area and area_sd [Nm m/s] are None, 0, None and None where there is no whole period. attractor
@@ -50,7 +50,7 @@ class Loop:
 
 def evaluate_loops(
     record: Record, geometry: Geometry, stationary: Mapping[float, StationaryCurve] | None
-) -> tuple[Loop, ...]:
+) -> tuple[FrictionLoop, ...]:
     """A loop for each stretch of constant pressure, in the record's order; empty where the pressure is never constant.
 
     `stationary` maps pressure levels [Pa] to the stationary curves measured in the clutch's present state; their covariance
@@ -80,13 +80,13 @@ def _loop(
     velocity: FloatArray,
     torque: FloatArray,
     curve: StationaryCurve | None,
-) -> Loop:
+) -> FrictionLoop:
     if np.median(velocity) < 0:  # the same swing in the other direction: the model is odd, the area unchanged
         velocity, torque = -velocity, -torque
     cycle = fit_cycle(time, velocity)
     samples = None if isinstance(cycle, str) else clean_samples(cycle, time, torque)
     if isinstance(cycle, str) or samples is None or samples.phase.size < FEWEST_SAMPLES:
-        return Loop(
+        return FrictionLoop(
             pressure=level,
             status=LagStatus.NO_PERIOD,
             message=cycle if isinstance(cycle, str) else "Too few samples lie in whole periods.",
@@ -95,7 +95,7 @@ def _loop(
     status, fits = _lags(cycle, samples, curve)
     attractor, film = fits if fits else (None, None)
     better = None if attractor is None or film is None else _better(attractor, film)
-    return Loop(
+    return FrictionLoop(
         pressure=level,
         frequency=cycle.frequency,
         periods=cycle.periods,

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from models.arrays import FloatArray
 from models.gaussian_evidence import log_normal
 from models.plausibility import criteria
-from models.tracking.courses import Course, basis
+from models.tracking.courses import CourseForm, basis
 from models.tracking.discrepancy import FUTURE, PAST, smooth
 
 #: The nodes [g] that are averaged over: the scale, the deviations of the change and of δ, and the scatter of each.
@@ -55,13 +55,13 @@ def _own_clock(cycles: FloatArray, latest: float) -> FloatArray:
     if latest < 1e-300:
         return np.tile(np.minimum(cycles, 1.0), (_LOG_SCALES.size, 1))
     log_scale = (_LOG_SCALES + math.log(latest))[:, None]
-    course = np.full(1, Course.LOGARITHM, dtype=np.intp)
+    course = np.full(1, CourseForm.LOGARITHM, dtype=np.intp)
     at, at_end = (basis(zeta, log_scale, np.zeros((1, 1)), course) for zeta in (cycles[None], np.array([[latest]])))
     return np.asarray(at / at_end)
 
 
 @dataclass(frozen=True)
-class Fit:
+class CourseFit:
     """The tests of a life taken in, and what they say of further ones.
 
     At a node y - level = A w + scatter with w standard normal: A holds level and steps, the change and δ in their prior

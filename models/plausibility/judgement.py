@@ -27,8 +27,8 @@ from numpy.typing import NDArray
 from models.arrays import FloatArray
 from models.gaussian_evidence import log_normal
 from models.plausibility import criteria, pace
-from models.plausibility.course import Fit, Predicted, Tests, log_physics, missed
-from models.plausibility.slips import OF_CLUTCH, OTHER_CLUTCH, OTHER_CYCLES, Reading, Run, Slip, slips_of
+from models.plausibility.course import CourseFit, Predicted, Tests, log_physics, missed
+from models.plausibility.slips import OF_CLUTCH, OTHER_CLUTCH, OTHER_CYCLES, Run, RunReading, Slip, slips_of
 
 #: No slip is proved by a number that underflows.
 _LEAST = math.log(1e-250)
@@ -50,7 +50,7 @@ class Belief:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Verdict:
+class SlipVerdict:
     """Of a run that probably slipped: the most probable slip, COF where the others put it [-, -] (None: it shows none)
     at the cycles as sent, and whether its date is out of order with theirs."""
 
@@ -64,16 +64,16 @@ class Verdict:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Judgement:
+class JointJudgement:
     """Verdicts on the runs that are to be held, by index; the tests of which can be said whether COF has a new level from
     them on, and those from which on it has."""
 
-    held: Mapping[int, Verdict]
+    held: Mapping[int, SlipVerdict]
     tests: frozenset[int]
     levels: frozenset[int]
 
 
-def judge(runs: Sequence[Run], about: Collection[int] = ()) -> Judgement:
+def judge(runs: Sequence[Run], about: Collection[int] = ()) -> JointJudgement:
     """The runs that are to be held, and new levels among the others.
 
     `runs` in the order of the history. Of more than can be looked at, those nearest to the runs `about` which somebody asks
@@ -83,10 +83,10 @@ def judge(runs: Sequence[Run], about: Collection[int] = ()) -> Judgement:
     best, weighed = _searched(clutch)
     held_runs = _held(clutch, best, weighed)
     levels = best.belief.levels & clutch.followed
-    return Judgement(held=held_runs, tests=clutch.followed, levels=levels - held_runs.keys())
+    return JointJudgement(held=held_runs, tests=clutch.followed, levels=levels - held_runs.keys())
 
 
-def _held(clutch: "_Clutch", best: "_Weighed", weighed: dict[Belief, float]) -> dict[int, Verdict]:
+def _held(clutch: "_Clutch", best: "_Weighed", weighed: dict[Belief, float]) -> dict[int, SlipVerdict]:
     """Verdicts on the runs that probably slipped, by the beliefs that were met."""
     weighed |= {other: _Weighed(clutch=clutch, belief=other).log_probability for other in best.instead()}
     doubts = any(log_odds >= math.log(criteria.HELD) for log_odds in best.log_odds.values())
@@ -130,7 +130,7 @@ class _Clutch:
 
     runs: tuple[Run, ...]
     about: frozenset[int]
-    fits: dict[tuple[Any, ...], Fit] = field(default_factory=dict)
+    fits: dict[tuple[Any, ...], CourseFit] = field(default_factory=dict)
     _weighed_slips: dict[int, list[Slip]] = field(default_factory=dict)
 
     def slips(self, index: int, expected: float) -> list[Slip]:
@@ -262,9 +262,9 @@ class _Weighed:
         return lives
 
     @cached_property
-    def fits(self) -> list[tuple[Fit, list[int]]]:
+    def fits(self) -> list[tuple[CourseFit, list[int]]]:
         """The course of every life, and the indices of its tests."""
-        fits: list[tuple[Fit, list[int]]] = []
+        fits: list[tuple[CourseFit, list[int]]] = []
         level, level_sd = math.log(criteria.COF), criteria.LOG_COF_SD
         for life in range(len(self.origins)):
             tests_of_life = [i for i in self.clutch.tests if self.life_of[i] == life and i not in self.belief.slipped]
@@ -275,7 +275,7 @@ class _Weighed:
                 level, level_sd = float(fit.tests.log_cof[np.argmin(fit.tests.cycles)]), 0.3
         return fits
 
-    def _fit(self, own: Sequence[int], life: int, level: float, level_sd: float) -> Fit:
+    def _fit(self, own: Sequence[int], life: int, level: float, level_sd: float) -> CourseFit:
         """The course of a life by these of its tests."""
         origin, belief = self.origins[life], self.belief
         shifts = self._shifts(life)
@@ -294,10 +294,10 @@ class _Weighed:
                 level=level,
                 level_sd=level_sd,
             )
-            self.clutch.fits[key] = Fit(tests)
+            self.clutch.fits[key] = CourseFit(tests)
         return self.clutch.fits[key]
 
-    def _without(self, index: int, life: int) -> Fit:
+    def _without(self, index: int, life: int) -> CourseFit:
         """The course of a life without one of its tests."""
         fit, fitted_tests = self.fits[life]
         if index not in fitted_tests:
@@ -361,13 +361,13 @@ class _Weighed:
         other_cycles = [runs[i].sent.cycles for i in self.fits[life][1] if i != index]
         return self._new_level_probability(life, cycles) if other_cycles and max(other_cycles) < cycles else 0.0
 
-    def log_cof(self, index: int, readings: Sequence[Reading]) -> list[float]:
+    def log_cof(self, index: int, readings: Sequence[RunReading]) -> list[float]:
         """log density of the COF of readings of a run by the course of the others; 0 for one that shows none."""
         run, life = self.clutch.runs[index], self.life_of[index]
         shown = [reading for reading in readings if reading.log_cof is not None]
         if not shown:
             return [0.0] * len(readings)
-        by_life: dict[int, list[Reading]] = {}
+        by_life: dict[int, list[RunReading]] = {}
         for reading in shown:
             at = life if reading.cycles == run.sent.cycles else self._life_at(reading.cycles)
             by_life.setdefault(at, []).append(reading)
@@ -468,7 +468,7 @@ class _Weighed:
         odd = sorted((i for i in compared_runs if surprise[i] > least), key=lambda i: (-surprise[i], i))
         return frozenset(odd[:4])
 
-    def _misses(self, shows: Sequence[int], life: int, fit: Fit) -> FloatArray:
+    def _misses(self, shows: Sequence[int], life: int, fit: CourseFit) -> FloatArray:
         """How far the COF of runs that are no tests [k] is from the course: log density lost against its middle."""
         sent = [self.clutch.runs[i].sent for i in shows]
         cycles = np.array([reading.cycles for reading in sent])
@@ -517,7 +517,7 @@ class _Weighed:
             if i in belief.outlying | belief.levels:
                 yield belief.turned(i)
 
-    def verdict(self, index: int) -> Verdict:
+    def verdict(self, index: int) -> SlipVerdict:
         """What is said of a run that is doubted."""
         sent = self.clutch.runs[index].sent
         weighed = self.weigh(index)
@@ -527,7 +527,7 @@ class _Weighed:
             other_cycles = np.unique(self.clutch.cycles[[i for i in self.kept if i != index]])
         before = other_cycles[other_cycles < sent.cycles - 0.5]
         gaps = np.diff(other_cycles)
-        return Verdict(
+        return SlipVerdict(
             slip=slip,
             expected=self._interval(index, sent),
             expected_then=self._interval(index, slip.likely),
@@ -537,7 +537,7 @@ class _Weighed:
             latest=float(other_cycles[-1]) if other_cycles.size else None,
         )
 
-    def _interval(self, index: int, reading: Reading) -> tuple[float, float] | None:
+    def _interval(self, index: int, reading: RunReading) -> tuple[float, float] | None:
         life = self._life_at(reading.cycles)
         if all(fitted_tests in ([], [index]) for _, fitted_tests in self.fits):
             return None

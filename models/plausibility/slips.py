@@ -20,7 +20,7 @@ OF_CLUTCH = (OTHER_CLUTCH, OTHER_TEST)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Reading:
+class RunReading:
     """What a run shows, as sent or without a slip.
 
     `cycles` since new; `log_cof` the logarithm of mean COF as the stationary tests of its life show it and `spread` its own
@@ -39,7 +39,7 @@ class Slip:
 
     name: str
     log_prior: float
-    likely: Reading
+    likely: RunReading
     unit: str = ""
 
 
@@ -47,7 +47,7 @@ class _Run(NamedTuple):
     name: str
     kind: str
     cycles: float
-    reading: Callable[[], Reading]
+    reading: Callable[[], RunReading]
     slips: Callable[[], Iterable[Slip]] = tuple
     tests: bool = False
     block: float | None = None
@@ -67,7 +67,7 @@ class Run(_Run):
     """
 
     @cached_property
-    def sent(self) -> Reading:
+    def sent(self) -> RunReading:
         """The run as it came in."""
         return self.reading()
 

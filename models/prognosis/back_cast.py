@@ -26,8 +26,8 @@ from models.friction.criteria import Z90
 from models.prognosis.criteria import AHEAD, COVERAGE
 from models.prognosis.first_passage import bands
 from models.tracking.measurement import Measurement
-from models.tracking.posterior import Posterior
-from models.tracking.prior import Prior
+from models.tracking.posterior import TrackPosterior
+from models.tracking.prior import TrackPrior
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -81,7 +81,7 @@ class BackCast:
         miss = abs(test.value - median) / half if half > 0.0 else 0.0
         return replace(self, misses=np.append(self.misses, min(miss, 3.0)))  # it may be outlying
 
-    def forecast(self, posterior: Posterior, newest: Measurement, prior: Prior) -> "BackCast":
+    def forecast(self, posterior: TrackPosterior, newest: Measurement, prior: TrackPrior) -> "BackCast":
         """With the forecast of a posterior that knows all tests up to the newest."""
         _, ahead = bands(posterior, newest.progress * np.array(AHEAD))
         medians = ahead[:, 1]

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.prognosis.first_passage import weighted_quantiles
-from models.tracking.courses import Course
-from models.tracking.posterior import Posterior
+from models.tracking.courses import CourseForm
+from models.tracking.posterior import TrackPosterior
 
 
 class CourseName(StrEnum):
@@ -24,7 +24,7 @@ class CourseName(StrEnum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class CourseShare:
+class CourseProbability:
     """A kind of course, its probability, and the median of its kinetics' order n = 1 + 1/ε [-]; None for a logarithm alone,
     which has none."""
 
@@ -33,26 +33,26 @@ class CourseShare:
     order: float | None
 
 
-def course_shares(posterior: Posterior) -> list[CourseShare]:
+def course_shares(posterior: TrackPosterior) -> list[CourseProbability]:
     """The kinds of course that have any probability, the most probable first."""
     accelerates = (posterior.exponent + 1.0) / posterior.scale < 0.0
     kinds = {
-        CourseName.EQ_6: posterior.course == Course.EQ_6,
-        CourseName.SLOWING: (posterior.course != Course.EQ_6) & ~accelerates,
-        CourseName.ACCELERATING: (posterior.course != Course.EQ_6) & accelerates,
+        CourseName.EQ_6: posterior.course == CourseForm.EQ_6,
+        CourseName.SLOWING: (posterior.course != CourseForm.EQ_6) & ~accelerates,
+        CourseName.ACCELERATING: (posterior.course != CourseForm.EQ_6) & accelerates,
     }
     shares = []
     for name, kinds_here in kinds.items():
         probability = float(posterior.weight[kinds_here].sum())
         if probability > 0.0:
             shares.append(
-                CourseShare(name=name, probability=min(probability, 1.0), order=_order(posterior, kinds_here))
+                CourseProbability(name=name, probability=min(probability, 1.0), order=_order(posterior, kinds_here))
             )
     return sorted(shares, key=lambda share: share.probability, reverse=True)
 
 
-def _order(posterior: Posterior, here: NDArray[np.bool_]) -> float | None:
-    ordered = here & (posterior.course != Course.LOGARITHM)
+def _order(posterior: TrackPosterior, here: NDArray[np.bool_]) -> float | None:
+    ordered = here & (posterior.course != CourseForm.LOGARITHM)
     if not posterior.weight[ordered].any():
         return None
     return float(weighted_quantiles(1.0 + 1.0 / posterior.exponent[ordered], posterior.weight[ordered], (0.5,))[0])

@@ -46,12 +46,12 @@ from scipy.special import gammaincinv, log_ndtr, logsumexp, ndtri
 from models.arrays import FloatArray
 from models.prognosis import criteria
 from models.prognosis.first_passage import Offset, ends_of_life
-from models.tracking.courses import FORM_COURSE, LEAST_DISCREPANCY, Course, log_form_weight
+from models.tracking.courses import FORM_COURSE, LEAST_DISCREPANCY, CourseForm, log_form_weight
 from models.tracking.criteria import STEP_SIZE
 from models.tracking.filters.grid import Grid
 from models.tracking.history import later_epochs, step_sizes
 from models.tracking.measurement import Measurement
-from models.tracking.posterior import Posterior
+from models.tracking.posterior import TrackPosterior
 from models.tracking.prior import weak
 from models.tracking.sampling import tempered
 
@@ -65,17 +65,17 @@ _ANYWHERE = 7.0
 #: Deviation of x: tests may begin when half of the way is behind.
 _LEVEL_SD = 0.5
 #: The laws of a life of which it is not known that it follows any.
-_NO_LAWS = (0.0,) * len(Course)
+_NO_LAWS = (0.0,) * len(CourseForm)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class EndedLife:
+class ObservedLife:
     """A life's end [ζ] by the criterion's `fraction`, and its course until then: `progress` [t] and
     `damage` [t] of its tests, the share of the way to the threshold; the mean energy [J] of its cycles, None where its duty
     does not state it.
 
     `deviation` is that of the logarithm of an uncertain end; of a `censored` life `end` is when it was taken out before it;
-    `laws` are the probabilities that its whole course is each `Course` with the least discrepancy.
+    `laws` are the probabilities that its whole course is each `CourseForm` with the least discrepancy.
     """
 
     end: float
@@ -100,7 +100,7 @@ class EndedLife:
         shares = np.append(np.array(self.progress) / self.end, 1.0)
         return np.asarray(np.interp(share, shares, np.append(self.damage, 1.0)))
 
-    def in_unit(self, cycles: float) -> "EndedLife":
+    def in_unit(self, cycles: float) -> "ObservedLife":
         """The life with ζ counted in units of `cycles`."""
         return replace(self, end=self.end / cycles, progress=tuple(zeta / cycles for zeta in self.progress))
 
@@ -109,7 +109,7 @@ class EndedLife:
         return asdict(self) | {name: list(getattr(self, name)) for name in _COLUMNS}
 
     @classmethod
-    def from_dict(cls, stored: Mapping[str, Any]) -> "EndedLife":
+    def from_dict(cls, stored: Mapping[str, Any]) -> "ObservedLife":
         """The inverse of `to_dict`, exactly."""
         return cls(**{**stored, **{name: tuple(stored[name]) for name in _COLUMNS}})
 
@@ -126,7 +126,7 @@ def ended_life(
     initial: float,
     fraction: float,
     laws: tuple[float, ...] = _NO_LAWS,
-) -> EndedLife | None:
+) -> ObservedLife | None:
     """What a life that ended at ζ = `end` > 0 teaches, by its tests at progress [n] >= 0 with values [n].
 
     `initial` > 0 is the value when new, `laws` as `new_and_laws` has them. None where it was measured at fewer than
@@ -138,19 +138,21 @@ def ended_life(
         return None
     mean = np.bincount(where, weights=values[before]) / np.bincount(where)
     damage = (1.0 - mean / initial) / (1.0 - fraction)
-    return EndedLife(end=end, fraction=fraction, progress=tuple(at.tolist()), damage=tuple(damage.tolist()), laws=laws)
+    return ObservedLife(
+        end=end, fraction=fraction, progress=tuple(at.tolist()), damage=tuple(damage.tolist()), laws=laws
+    )
 
 
 def new_and_laws(history: Sequence[Measurement]) -> tuple[float, tuple[float, ...]]:
     """Of a life by its measurements in order, as the exact filter has it under the weak prior: ξ0 in the mean, and the
-    probabilities that its course is each `Course` with the least discrepancy."""
+    probabilities that its course is each `CourseForm` with the least discrepancy."""
     drawn = _drawn(history)
     lawful = drawn.weight * LEAST_DISCREPANCY[drawn.form]
-    laws = np.bincount(drawn.course, weights=lawful, minlength=len(Course))
+    laws = np.bincount(drawn.course, weights=lawful, minlength=len(CourseForm))
     return float(drawn.weight @ drawn.initial), tuple(laws.tolist())
 
 
-def _drawn(history: Sequence[Measurement]) -> Posterior:
+def _drawn(history: Sequence[Measurement]) -> TrackPosterior:
     prior = weak(history[0], falling=True)
     return _GRID.posterior(_GRID.from_history(prior, history), 500, np.random.default_rng(0))
 
@@ -174,7 +176,7 @@ def declared_end(
     return at * math.exp(mean), math.sqrt(max(0.0, square - mean**2))
 
 
-def representative(lives: Sequence[EndedLife], most: int = 40) -> list[EndedLife]:
+def representative(lives: Sequence[ObservedLife], most: int = 40) -> list[ObservedLife]:
     """The lives; of more than `most`, so many, evenly taken by their ends: with 40 their predictive is within 3 % of the
     normal's width, and each costs every answer 0.1 ms."""
     if len(lives) <= most:
@@ -236,7 +238,7 @@ class Kin:
 
 
 def as_its_kind(
-    tests: Sequence[Measurement], as_of: float, lives: Sequence[EndedLife], offset: FloatArray | None = None
+    tests: Sequence[Measurement], as_of: float, lives: Sequence[ObservedLife], offset: FloatArray | None = None
 ) -> Kin | None:
     """The end of life of a clutch that is alive at ζ = `as_of` > 0, given its tests and lives that have ended.
 
@@ -249,7 +251,7 @@ def as_its_kind(
 
 @lru_cache(maxsize=8)
 def _as_its_kind(
-    tests: tuple[Measurement, ...], as_of: float, lives: tuple[EndedLife, ...], offset: tuple[float, ...] | None
+    tests: tuple[Measurement, ...], as_of: float, lives: tuple[ObservedLife, ...], offset: tuple[float, ...] | None
 ) -> Kin | None:
     exact = np.array([not life.censored for life in lives], dtype=bool)
     # two lives say more than none (`make real`)
@@ -297,7 +299,7 @@ def _as_its_kind(
     )
 
 
-def _forms(first: Measurement, lives: Sequence[EndedLife]) -> tuple[float, FloatArray]:
+def _forms(first: Measurement, lives: Sequence[ObservedLife]) -> tuple[float, FloatArray]:
     """The share of a kind that follows a law of a filter of a series that begins with `first`, by lives that have ended; and
     the shares of the filter's forms among the kind over those of its prior."""
     prior = np.exp(log_form_weight(weak(first, falling=True)))

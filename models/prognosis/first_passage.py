@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 from models.arrays import FloatArray
 from models.degradation import general_order
 from models.prognosis.criteria import BAND, HORIZON, QUANTILES
-from models.tracking.discrepancy import Discrepancy
-from models.tracking.posterior import Posterior
+from models.tracking.discrepancy import CourseDiscrepancy
+from models.tracking.posterior import TrackPosterior
 from models.tracking.sampling import systematic
 
 #: Of these every so many'th is looked at first. A dip below the threshold and back between two of them is not seen: the
@@ -31,7 +31,7 @@ from models.tracking.sampling import systematic
 _STRIDE = 6
 
 #: A given course over ζ [k] that is added to eq. 6, in the quantity's unit; [b, k] for each branch of the sample
-#: (`Posterior.branch`), or [1, k] for all.
+#: (`TrackPosterior.branch`), or [1, k] for all.
 Offset: TypeAlias = Callable[[FloatArray], FloatArray]
 
 
@@ -67,7 +67,7 @@ def horizon_at(age: float) -> float:
 
 
 def predict_first_passage(
-    posterior: Posterior,
+    posterior: TrackPosterior,
     *,
     fraction: float,
     as_of: float,
@@ -108,7 +108,7 @@ def predict_first_passage(
 
 
 def ends_of_life(
-    posterior: Posterior, fraction: float, *, offset: Offset | None = None, horizon: float = HORIZON
+    posterior: TrackPosterior, fraction: float, *, offset: Offset | None = None, horizon: float = HORIZON
 ) -> FloatArray:
     """The ζ [n] at which each draw first has ξ(ζ) <= fraction · ξ0; inf where it never has. A draw whose rate grows without
     bounds has passed every threshold there.
@@ -141,19 +141,19 @@ def widened(passages: FloatArray, weight: FloatArray, *, as_of: float, horizon: 
     return np.where(remaining > 0.0, as_of + raised, passages)
 
 
-def paths(posterior: Posterior, progress: FloatArray, offset: Offset | None = None) -> FloatArray:
+def paths(posterior: TrackPosterior, progress: FloatArray, offset: Offset | None = None) -> FloatArray:
     """ξ(ζ) + offset(ζ) at progress [k] of every draw; [k, n]."""
     values = posterior.values(progress)
     return values if offset is None else np.asarray(values + posterior.beside(offset(progress)))
 
 
-def bands(posterior: Posterior, progress: FloatArray) -> tuple[FloatArray, FloatArray]:
+def bands(posterior: TrackPosterior, progress: FloatArray) -> tuple[FloatArray, FloatArray]:
     """The mean of ξ at progress [k], and its quantiles BAND [k, 3]: what a plot of the course shows."""
     values = posterior.values(progress)
     return values @ posterior.weight, np.array([weighted_quantiles(row, posterior.weight, BAND) for row in values])
 
 
-def _along_paths(posterior: Posterior, fraction: float, offset: Offset | None, horizon: float) -> FloatArray:
+def _along_paths(posterior: TrackPosterior, fraction: float, offset: Offset | None, horizon: float) -> FloatArray:
     """First passages [n], linear between places; a step of the level or of the offset is a crossing where it is.
 
     The draws' paths are taken at every `_STRIDE`-th place and about the steps, and then at the places between the two of
@@ -177,7 +177,7 @@ def _along_paths(posterior: Posterior, fraction: float, offset: Offset | None, h
     return passages
 
 
-def _places(beside: Discrepancy | None, horizon: float) -> tuple[FloatArray, NDArray[np.intp]]:
+def _places(beside: CourseDiscrepancy | None, horizon: float) -> tuple[FloatArray, NDArray[np.intp]]:
     """Ascending progress at which paths are looked at, and which of it are the steps after the first place."""
     span = 1.0 if beside is None else beside.span
     at = np.zeros(0) if beside is None else beside.at[(beside.at > 0.0) & (beside.at <= horizon)]

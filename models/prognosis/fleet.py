@@ -28,12 +28,12 @@ from scipy.special import gammaln, log_expit
 
 from models.arrays import FloatArray
 from models.prognosis import criteria
-from models.tracking.courses import UNIT_OF_CHANGE, WITHOUT_EXPONENT, Course
+from models.tracking.courses import UNIT_OF_CHANGE, WITHOUT_EXPONENT, CourseForm
 from models.tracking.criteria import REACH
 from models.tracking.filters.grid import Grid
 from models.tracking.measurement import Measurement
-from models.tracking.posterior import Posterior, joined
-from models.tracking.prior import Prior, weak
+from models.tracking.posterior import TrackPosterior, joined
+from models.tracking.prior import TrackPrior, weak
 from models.tracking.sampling import normalised
 
 _GRID = Grid()
@@ -62,7 +62,7 @@ class FleetPrior:
         """The population with φ counted in units of `cycles`."""
         return replace(self, mean=self.mean - np.array([0.0, math.log(cycles), 0.0, 0.0]))
 
-    def prior_for(self, first: Measurement) -> Prior:
+    def prior_for(self, first: Measurement) -> TrackPrior:
         """The normal nearest to the population, half as wide again, for a filter of a series that begins with `first`."""
         believed = weak(first, falling=True)
         size = believed.size
@@ -90,7 +90,7 @@ class FleetPrior:
         distance = np.square(off).sum(axis=0)
         return np.asarray(constant - np.log(np.diag(root)).sum() - 0.5 * (f + d) * np.log1p(distance / f))
 
-    def together(self, under_weak: Posterior, under_fleet: Posterior, first: Measurement) -> Posterior:
+    def together(self, under_weak: TrackPosterior, under_fleet: TrackPosterior, first: Measurement) -> TrackPosterior:
         """Samples of the posterior under `weak` and under `prior_for`, as one of the posterior under the mixture."""
         ours, theirs = weak(first, falling=True), self.prior_for(first)
         under_weak, under_fleet = _possible(under_weak, ours), _possible(under_fleet, theirs)
@@ -101,7 +101,7 @@ class FleetPrior:
         split = under_weak.weight.size
         ratio = _log_evidence_ratio(lean[:split], under_weak.weight, lean[split:], under_fleet.weight)
         learned = self.log_density(_coordinates(drawn)) - np.log(np.abs(drawn.initial)) - log_weak
-        learned = np.where(drawn.course == Course.EQ_6, learned, 0.0)  # of the other courses it has learned nothing
+        learned = np.where(drawn.course == CourseForm.EQ_6, learned, 0.0)  # of the other courses it has learned nothing
         mixture = np.logaddexp(math.log1p(-self.share), math.log(self.share) + learned)
         with np.errstate(divide="ignore"):
             log_weight = np.log(drawn.weight) + mixture - np.logaddexp(0.0, lean - ratio)
@@ -157,7 +157,7 @@ def population(fleet: Sequence[Taught], rounds: int = 40) -> FleetPrior:
     return learned
 
 
-def pooled(first: Posterior, second: Posterior) -> Posterior:
+def pooled(first: TrackPosterior, second: TrackPosterior) -> TrackPosterior:
     """The draws of both, each with half of the weight; discrepancies must be of the same history."""
     both = joined((first, second))
     return replace(both, weight=0.5 * both.weight)
@@ -188,13 +188,13 @@ def _learnt(population: FleetPrior, fleet: Sequence[Taught], believed: FloatArra
     )
 
 
-def _coordinates(drawn: Posterior) -> FloatArray:
+def _coordinates(drawn: TrackPosterior) -> FloatArray:
     """x [n, 4] of a sample."""
     log_scatter = np.log(drawn.scatter / np.abs(drawn.initial))
     return np.stack([drawn.change / drawn.initial, drawn.log_scale, drawn.log_exponent, log_scatter], axis=1)
 
 
-def _log_prior(drawn: Posterior, prior: Prior) -> FloatArray:
+def _log_prior(drawn: TrackPosterior, prior: TrackPrior) -> FloatArray:
     """Log density of (Δ, log φ, log ε, log s) [n] under a prior; ξ0 has the same under all."""
     spread = math.log(prior.change_sd * prior.log_scale_sd * prior.log_exponent_sd * prior.log_scatter_sd)
     off = (drawn.change * UNIT_OF_CHANGE[drawn.course] - prior.change_mean) / prior.change_sd
@@ -206,7 +206,7 @@ def _log_prior(drawn: Posterior, prior: Prior) -> FloatArray:
     return np.asarray(density - np.where(no_exponent, of_exponent, 0.0))
 
 
-def _on_the_grid_of(prior: Prior, drawn: Posterior) -> NDArray[np.bool_]:
+def _on_the_grid_of(prior: TrackPrior, drawn: TrackPosterior) -> NDArray[np.bool_]:
     """Which draws [n] lie where the exact filter under a prior has its grid: within REACH deviations of the prior's means.
 
     Only those can be in the samples of both priors, as Bennett's ratio of their evidences needs.
@@ -220,7 +220,7 @@ def _on_the_grid_of(prior: Prior, drawn: Posterior) -> NDArray[np.bool_]:
     return np.asarray((np.abs(off) <= REACH).all(axis=0))
 
 
-def _possible(drawn: Posterior, prior: Prior) -> Posterior:
+def _possible(drawn: TrackPosterior, prior: TrackPrior) -> TrackPosterior:
     """A sample under a prior without the draws whose Δ lies beyond the prior's range, if there are others: the normals of an
     unscented filter reach there, and one draw divided by a density that vanishes would have all of the weight."""
     off = (drawn.change * UNIT_OF_CHANGE[drawn.course] - prior.change_mean) / prior.change_sd

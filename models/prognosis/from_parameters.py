@@ -37,10 +37,10 @@ from models.arrays import FloatArray
 from models.friction.stribeck import StribeckParameters, slope, torque
 from models.prognosis.criteria import BAND, FAR_APART, FEWEST_TESTS, HORIZON
 from models.prognosis.first_passage import first_below, places, weighted_quantiles
-from models.tracking.courses import Course, basis
+from models.tracking.courses import CourseForm, basis
 from models.tracking.criteria import UNMERGED
 from models.tracking.merged_tests import bins_of
-from models.tracking.posterior import Posterior
+from models.tracking.posterior import TrackPosterior
 from models.tracking.sampling import systematic, tempered
 
 #: Combinations that are tried.
@@ -51,10 +51,10 @@ def draw_jointly(
     progress: FloatArray,
     values: FloatArray,
     covariance: FloatArray,
-    own: Sequence[Posterior],
+    own: Sequence[TrackPosterior],
     size: int,
     rng: np.random.Generator,
-) -> list[Posterior]:
+) -> list[TrackPosterior]:
     """`size` equal draws of each of q quantities, row by row together, from their own tracks.
 
     `progress` [t] >= 0 and `values` [t, q] with `covariance` [t, q, q], positive definite: that of the fit and the scatter
@@ -71,7 +71,7 @@ def draw_jointly(
     index = np.take_along_axis(index, np.argsort(rng.random(index.shape), axis=0), axis=0)
     scale = np.stack([np.log(track.scale[i]) for track, i in zip(own, index.T, strict=True)])
     exponent = np.stack([np.log(track.exponent[i]) for track, i in zip(own, index.T, strict=True)])
-    b = basis(progress[:, None, None], scale, exponent, np.array(Course.EQ_6))  # [t, q, n]
+    b = basis(progress[:, None, None], scale, exponent, np.array(CourseForm.EQ_6))  # [t, q, n]
     mean, root, evidence = _solved(b, scaled, precision)
     for column in range(quantities):
         alone = 1.0 / spread[:, column, column]
@@ -82,7 +82,7 @@ def draw_jointly(
     ).squeeze(2)
     drawn = drawn.reshape(size, 2, quantities) * typical
     return [
-        Posterior(
+        TrackPosterior(
             weight=np.full(size, 1.0 / size),
             initial=drawn[:, 0, column],
             change=drawn[:, 1, column],
@@ -173,11 +173,11 @@ class PressureLevel:
     progress: FloatArray
     parameters: FloatArray
     covariance: FloatArray
-    parameter_tracks: Sequence[Posterior]
+    parameter_tracks: Sequence[TrackPosterior]
     tests: Sequence[int]
     cof_progress: FloatArray
     cof: FloatArray
-    cof_track: Posterior
+    cof_track: TrackPosterior
     torque_per_cof: float
     reference_cof: float
 
@@ -205,7 +205,7 @@ class CofPaths:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Disagreement:
+class TrackDisagreement:
     """COF from parameters less the direct track: of the value now, in deviations of both together, and of the median end of
     life, in those of its logarithm. None where there is no uncertainty, or one of them lies beyond the horizon."""
 
@@ -252,7 +252,7 @@ def disagreement(
     direct_ends: FloatArray,
     weight: FloatArray,
     origin: float,
-) -> Disagreement:
+) -> TrackDisagreement:
     """How far mean COF `now` [n] and `ends` of life [n] cycles from the parameters are from those of the direct track, [m]
     each with weight [m]; the life began at `origin` [cycles]."""
     mean = float(weight @ direct_now)
@@ -269,13 +269,13 @@ def disagreement(
     beyond = any(math.exp(median) > HORIZON for _, median, _ in logarithms)
     # of a normal's 90 % interval, in deviations
     spread = math.sqrt(0.5 * sum(((high - low) / 3.29) ** 2 for low, _, high in logarithms))
-    return Disagreement(
+    return TrackDisagreement(
         now=(float(now.mean()) - mean) / both if both > 0.0 else None,
         end_of_life=None if beyond or spread == 0.0 else float(logarithms[0][1] - logarithms[1][1]) / spread,
     )
 
 
-def parameter_draws(level: PressureLevel, rng: np.random.Generator) -> list[Posterior]:
+def parameter_draws(level: PressureLevel, rng: np.random.Generator) -> list[TrackPosterior]:
     """Joint draws of the four parameters at a pressure, under the fits' covariance and the scatter between tests."""
     values, covariance = level.parameters, _averaged(level.covariance)
     scatter = np.array([track.weight @ np.square(track.scatter) for track in level.parameter_tracks])
@@ -299,7 +299,7 @@ def _averaged(covariance: FloatArray) -> FloatArray:
     return np.stack([covariance[max(0, place - _BESIDE) : place + _BESIDE + 1].mean(axis=0) for place in places])
 
 
-def _mean_torque(draws: Sequence[Posterior], progress: FloatArray, velocities: FloatArray) -> FloatArray:
+def _mean_torque(draws: Sequence[TrackPosterior], progress: FloatArray, velocities: FloatArray) -> FloatArray:
     """Mean torque over velocities [m] at ζ [k] of every draw of the four parameters; [k, n]."""
     parameters = _parameters_at(draws, progress)
     total: FloatArray = np.zeros(np.shape(parameters.static_torque))
@@ -334,6 +334,6 @@ def slope_paths(level: PressureLevel, velocity: float, progress: FloatArray, rng
     return np.asarray(slope(np.array(velocity), parameters) / level.torque_per_cof)
 
 
-def _parameters_at(draws: Sequence[Posterior], progress: FloatArray) -> StribeckParameters:
+def _parameters_at(draws: Sequence[TrackPosterior], progress: FloatArray) -> StribeckParameters:
     """The four parameters of every draw at ζ [k]; [k, n] each."""
     return StribeckParameters.from_array(np.maximum(np.stack([track.values(progress) for track in draws]), 0.0))

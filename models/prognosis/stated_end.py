@@ -25,11 +25,11 @@ from scipy.special import expit
 
 from models.arrays import FloatArray
 from models.prognosis.criteria import COUNTED_ELSEWHERE, FEWEST_TESTS, LATE_START
-from models.prognosis.ended_lives import EndedLife, as_its_kind
+from models.prognosis.ended_lives import ObservedLife, as_its_kind
 from models.prognosis.first_passage import Offset, ends_of_life, paths, widened
 from models.tracking.filters.grid import Grid
 from models.tracking.measurement import Measurement
-from models.tracking.posterior import Posterior
+from models.tracking.posterior import TrackPosterior
 from models.tracking.prior import weak
 
 _GRID, _DRAWS = Grid(nodes=13, rows=13, levels=7), 500
@@ -84,7 +84,7 @@ def late_start(
 
 
 @lru_cache(maxsize=8)
-def _weighed(tests: tuple[Measurement, ...], begun: float) -> tuple[float, Posterior]:
+def _weighed(tests: tuple[Measurement, ...], begun: float) -> tuple[float, TrackPosterior]:
     """The log odds that the clutch was new at its first test, and draws if it was; kept for the next filter."""
     prior = weak(min(tests, key=lambda test: test.progress), falling=True)
     since = [replace(test, progress=test.progress - begun) for test in tests]
@@ -117,14 +117,14 @@ class StatedEnd:
 
 
 def stated_end(
-    posterior: Posterior,
+    posterior: TrackPosterior,
     *,
     fraction: float,
     as_of: float,
     horizon: float,
     offset: Offset | None = None,
     power: float = 1.0,
-    ended: Sequence[EndedLife] = (),
+    ended: Sequence[ObservedLife] = (),
     tests: Sequence[Measurement] = (),
 ) -> StatedEnd:
     """The end of a life that is at ζ = `as_of`, as `posterior` has it, its remaining part `widened` by `power`.
@@ -158,7 +158,7 @@ def stated_end(
     return StatedEnd(ends=ends, weight=weight, lives=lives, late=late)
 
 
-def _mean(posterior: Posterior, offsets: FloatArray) -> FloatArray:
+def _mean(posterior: TrackPosterior, offsets: FloatArray) -> FloatArray:
     """What an offset adds [b, k], in the mean over the branches [1, k]."""
     at_offsets = posterior.beside(offsets)
     return np.asarray(at_offsets.T if at_offsets.shape[1] == 1 else (at_offsets @ posterior.weight)[None])

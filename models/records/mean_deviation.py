@@ -104,7 +104,7 @@ class Stretch:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Correlation:
+class DwellAutocorrelation:
     """ρ at lags 1, 2, ... [m]; resolved is false where it had not faded at the longest lag that dwells can show: then it is
     that of `slow_correlation`."""
 
@@ -118,7 +118,7 @@ class Correlation:
         return max(float(1 + 2 * (np.maximum(1 - lag / count, 0.0) * self.lags).sum()), 0.2)
 
 
-def pooled_correlation(residuals: Sequence[FloatArray], removed: int) -> Correlation:
+def pooled_correlation(residuals: Sequence[FloatArray], removed: int) -> DwellAutocorrelation:
     """ρ of all residuals together, each of which `removed` coefficients of low frequency were fitted to."""
     length = float(np.median([residual.size for residual in residuals]))
     longest = max(1, min(400, int(criteria.LOST_SHARE * length / (2 * removed))))  # averages
@@ -132,7 +132,7 @@ def pooled_correlation(residuals: Sequence[FloatArray], removed: int) -> Correla
         total += products * (residual.size / power)
         count += residual.size - np.arange(longest + 1)
     if count[0] == 0.0:
-        return Correlation(lags=np.zeros(0))
+        return DwellAutocorrelation(lags=np.zeros(0))
     covariance = total / count
     # What was removed takes `removed` Λ/n off every lag, Λ = γ_0 + 2 Σ γ_k being unknown: solved for each window.
     lag = np.arange(longest + 1)
@@ -144,8 +144,8 @@ def pooled_correlation(residuals: Sequence[FloatArray], removed: int) -> Correla
     window = int(enough.argmax()) if enough.any() else longest
     lags = (covariance[1 : window + 1] + lost[window]) / (covariance[0] + lost[window])
     if enough.any() or abs(float(lags[-1])) < 0.1:
-        return Correlation(lags=lags)
-    return Correlation(lags=slow_correlation(residuals), resolved=False)
+        return DwellAutocorrelation(lags=lags)
+    return DwellAutocorrelation(lags=slow_correlation(residuals), resolved=False)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -188,7 +188,7 @@ def deviations(stretches: Sequence[Stretch]) -> MeanDeviations:
     )
 
 
-def _moments(residual: FloatArray, correlation: Correlation) -> tuple[float, float, float, float]:
+def _moments(residual: FloatArray, correlation: DwellAutocorrelation) -> tuple[float, float, float, float]:
     """Variance of an average, the factor of its mean, batch means' variance over that by the factor, degrees of freedom."""
     size = residual.size
     factor = correlation.factor(size)

@@ -2,7 +2,7 @@
 
 Run-in of 200 engagements before cycle 0, tests at 0, then at 500, 1000, 2000, 3000, ... duty cycles, until the true mean
 COF has fallen below `stop_fraction` of its initial value or `most_tests` stationary tests are made. The tests are those of
-a `Programme`. All of it is simulated, and every run id says so. Runs have no time of day: the sender adds it.
+a `RigProgramme`. All of it is simulated, and every run id says so. Runs have no time of day: the sender adds it.
 """
 
 import itertools
@@ -14,7 +14,7 @@ import numpy as np
 from models.engagements.simulation import Drive, engage
 from models.friction.speed_protocol import RPM
 from models.records.runs import Record
-from models.rig.programme import CYCLE_ENERGY, QUICK, Ageing, PlannedTest, Programme
+from models.rig.programme import CYCLE_ENERGY, QUICK, Ageing, PlannedTest, RigProgramme
 from models.rig.sampled import DynamicTest, engagement_record, sampled_test
 from models.rig.simulated_runs import DutyBlock, RunKind, SimulatedRun
 from models.rig.stationary import Sensor, stationary_test
@@ -40,7 +40,7 @@ def simulate(
     *,
     clutch: SimulatedClutch | None = None,
     sensor: Sensor | None = None,
-    programme: Programme = QUICK,
+    programme: RigProgramme = QUICK,
     stop_fraction: float = 0.45,
     most_tests: int = 40,
 ) -> Iterator[SimulatedRun]:
@@ -73,7 +73,7 @@ def planned(
 ) -> Iterator[SimulatedRun]:
     """The runs of a plan's tests on a clutch that a campaign has brought to `cycles` and `wear`, with the duty cycles up to
     each. `made`: how many tests of plans it has had, which tells their noise and their names apart."""
-    rig = _Rig(seed=seed, clutch=clutch, sensor=sensor, programme=Programme(engagements=True, ageing=ageing))
+    rig = _Rig(seed=seed, clutch=clutch, sensor=sensor, programme=RigProgramme(engagements=True, ageing=ageing))
     for test in tests:
         if test.cycles > cycles:
             block = rig.duty_run(cycles, test.cycles, wear)
@@ -103,7 +103,7 @@ class _Rig:
     seed: int
     clutch: SimulatedClutch
     sensor: Sensor
-    programme: Programme
+    programme: RigProgramme
 
     def runs(self, stop_fraction: float, most_tests: int) -> Iterator[SimulatedRun]:
         """Fig. 2."""

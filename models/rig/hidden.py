@@ -33,7 +33,7 @@ _MIDDLE = 6.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Rows:
+class HiddenTest:
     """One test of a clutch: `held` as it was measured, its clock [n] s (middles of plateaus, times of samples), velocity [n]
     m/s >= 0, `curve` with the stationary parameters there, cycles since new and `wear`, the ζ of eq. 6."""
 
@@ -46,7 +46,7 @@ class Rows:
     wear: float
 
 
-Change: TypeAlias = Callable[[float, Rows], FloatArray]
+Change: TypeAlias = Callable[[float, HiddenTest], FloatArray]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -127,7 +127,7 @@ def _changed(
     if effect.loops and isinstance(held, Plateaus):
         return held
     middles = PLATEAU_DURATION * (np.arange(held.torque.size, dtype=np.float64) + 0.5)
-    rows = Rows(
+    rows = HiddenTest(
         held=held,
         clock=held.time if isinstance(held, Record) else middles,
         velocity=np.abs(clutch.geometry.sliding_velocity(held.speed)),
@@ -140,7 +140,7 @@ def _changed(
 
 
 @_hides("power of the viscosity's ratio", size=1.0)
-def _oil_temperature(size: float, rows: Rows) -> FloatArray:
+def _oil_temperature(size: float, rows: HiddenTest) -> FloatArray:
     return warm_torque(rows.held, rows.clutch, rows.wear, size) - rows.held.torque
 
 
@@ -150,32 +150,32 @@ def _drift(cycles: float) -> float:
 
 
 @_hides("loss of torque at 0.32 W/mm²", "%", size=15.0)
-def _interface_heating(size: float, rows: Rows) -> FloatArray:
+def _interface_heating(size: float, rows: HiddenTest) -> FloatArray:
     """Torque falls as 1/(1 + s P), P the power that the faces turn into heat."""
     warmth = heat_flux(rows.held, rows.clutch.geometry) / REFERENCE_FLUX
     return np.asarray(rows.held.torque * (1 / (1 + 0.01 * size * warmth) - 1), dtype=np.float64)
 
 
 @_hides("change of the exponent", size=0.3)
-def _viscous_exponent(size: float, rows: Rows) -> FloatArray:
+def _viscous_exponent(size: float, rows: HiddenTest) -> FloatArray:
     """C_v v^γ with ((1 + v)/(1 + v_m))^δ: the film thins with shear."""
     viscous = rows.curve.viscous_coefficient * rows.velocity**GAMMA
     return np.asarray(viscous * (((1 + rows.velocity) / (1 + _MIDDLE)) ** size - 1), dtype=np.float64)
 
 
 @_hides("drag in mid speed", "Nm", size=1.0)
-def _hydrodynamic_drag(size: float, rows: Rows) -> FloatArray:
+def _hydrodynamic_drag(size: float, rows: HiddenTest) -> FloatArray:
     """Grooves shear oil whatever the pressure, full at high speed."""
     return np.asarray(size * np.tanh(rows.velocity / _MIDDLE) / np.tanh(1.0), dtype=np.float64)
 
 
 @_hides("zero shift in the end", "Nm", size=1.5)
-def _torque_zero_shift(size: float, rows: Rows) -> FloatArray:
+def _torque_zero_shift(size: float, rows: HiddenTest) -> FloatArray:
     return np.full_like(rows.held.torque, size * _drift(rows.cycles))
 
 
 @_hides("offset in the end", "bar", size=0.5)
-def _pressure_offset(size: float, rows: Rows) -> FloatArray:
+def _pressure_offset(size: float, rows: HiddenTest) -> FloatArray:
     """The clutch is pressed by more than the gauge says, by ever more bar."""
     pressed = np.maximum(rows.held.pressure + 1e5 * size * _drift(rows.cycles), OPEN)
     really = torque(rows.velocity, rows.clutch.parameters(pressed, rows.wear))
@@ -183,7 +183,7 @@ def _pressure_offset(size: float, rows: Rows) -> FloatArray:
 
 
 @_hides("share of the plateaus before", "%", size=10.0)
-def _unsettled_dwell(size: float, rows: Rows) -> FloatArray:
+def _unsettled_dwell(size: float, rows: HiddenTest) -> FloatArray:
     """A plateau's mean still carries a share of the two plateaus before it."""
     if isinstance(rows.held, Record):
         return np.zeros_like(rows.held.torque)
@@ -193,14 +193,14 @@ def _unsettled_dwell(size: float, rows: Rows) -> FloatArray:
 
 
 @_hides("delay", "ms", size=80.0, loops=True)
-def _channel_delay(size: float, rows: Rows) -> FloatArray:
+def _channel_delay(size: float, rows: HiddenTest) -> FloatArray:
     return np.asarray(
         np.interp(rows.clock - 1e-3 * size, rows.clock, rows.held.torque) - rows.held.torque, dtype=np.float64
     )
 
 
 @_hides("moment of inertia", "kg m²", size=0.01, loops=True)
-def _inertia_torque(size: float, rows: Rows) -> FloatArray:
+def _inertia_torque(size: float, rows: HiddenTest) -> FloatArray:
     """J dω/dt of the speed, smoothed over its sensor's noise."""
     window = min(51, rows.held.speed.size - 1 + rows.held.speed.size % 2)
     rate = savgol_filter(rows.held.speed, window, 2, deriv=1) / np.median(np.diff(rows.clock))
@@ -208,20 +208,20 @@ def _inertia_torque(size: float, rows: Rows) -> FloatArray:
 
 
 @_hides("film time when new", "s", size=0.1, loops=True)
-def _squeeze_film(_: float, rows: Rows) -> FloatArray:
+def _squeeze_film(_: float, rows: HiddenTest) -> FloatArray:
     """The clutch itself has the film: `clutch_for`."""
     return np.zeros_like(rows.held.torque)
 
 
 @_hides("amplitude", "Nm", size=0.5, loops=True)
-def _shaft_ripple(size: float, rows: Rows) -> FloatArray:
+def _shaft_ripple(size: float, rows: HiddenTest) -> FloatArray:
     """Once a turn, and a little three times."""
     turn = np.concatenate([[0.0], np.cumsum(rows.held.speed[1:] * np.diff(rows.clock))])
     return np.asarray(size * (np.sin(turn) + 0.2 * np.sin(3 * turn)), dtype=np.float64)
 
 
 @_hides("amplitude", "Nm", size=1.0, loops=True)
-def _stick_slip(size: float, rows: Rows) -> FloatArray:
+def _stick_slip(size: float, rows: HiddenTest) -> FloatArray:
     """A skewed wave of 12 Hz that fades out from 0.5 to 1.2 m/s."""
     phase = 2 * np.pi * 12.0 * rows.clock
     slow = np.clip((1.2 - rows.velocity) / 0.7, 0.0, 1.0)
@@ -229,13 +229,13 @@ def _stick_slip(size: float, rows: Rows) -> FloatArray:
 
 
 @_hides("excess when new", "%", size=10.0)
-def _running_in(size: float, rows: Rows) -> FloatArray:
+def _running_in(size: float, rows: HiddenTest) -> FloatArray:
     """An excess of the new lining that goes as 1/(1 + ζ/ζ_r)²."""
     return np.asarray(0.01 * size * rows.held.torque / (1 + rows.cycles / 400.0) ** 2, dtype=np.float64)
 
 
 @_hides("further loss at 15,000 cycles", "%", size=20.0)
-def _accelerated_wear(size: float, rows: Rows) -> FloatArray:
+def _accelerated_wear(size: float, rows: HiddenTest) -> FloatArray:
     """A further loss that sets in late and grows as a square."""
     late = max(rows.cycles - 6_000.0, 0.0) / 9_000.0
     return np.asarray(-0.01 * size * late**2 * rows.held.torque, dtype=np.float64)

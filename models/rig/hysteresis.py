@@ -21,7 +21,7 @@ import numpy as np
 
 from models.arrays import FloatArray, require_finite
 from models.degradation.general_order import progress_fraction
-from models.friction.pressure_laws import LinearLaw
+from models.friction.pressure_laws import LinearPressureLaw
 from models.friction.stribeck import StribeckParameters, torque
 from models.loops.lag_laws import attractor_torque, squeeze_film_torque
 
@@ -37,7 +37,7 @@ class FrictionLag:
     `exponent` ε > 0 [-]; `attractor` C > 0 [Nm/s], None: none. Raises ValueError on values outside."""
 
     film_time: float = 0.1
-    loss: LinearLaw = field(default_factory=lambda: LinearLaw(intercept=-2.75, slope=0.7e-5))
+    loss: LinearPressureLaw = field(default_factory=lambda: LinearPressureLaw(intercept=-2.75, slope=0.7e-5))
     scale: float = 10_000.0
     exponent: float = 2.0
     attractor: float | None = None

@@ -44,7 +44,7 @@ class Ageing(StrEnum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Programme:
+class RigProgramme:
     """`dynamic`: the dynamic test after each stationary one, None: none, and `further` ones, at other frequencies. `raw`:
     stationary tests as sampled records, None: as plateaus, at `pressures` [Pa]. `engagements`: integrate one a block, for
     its energy and its trace.
@@ -64,5 +64,5 @@ class Programme:
             raise ValueError("ageing by energy needs engagements, got engagements=False")
 
 
-QUICK = Programme()
-WHOLE = Programme(dynamic=DynamicTest(), engagements=True)
+QUICK = RigProgramme()
+WHOLE = RigProgramme(dynamic=DynamicTest(), engagements=True)

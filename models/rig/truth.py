@@ -21,9 +21,9 @@ from scipy.optimize import brentq
 
 from models.arrays import FloatArray
 from models.clutch import Geometry
-from models.degradation.general_order import Degradation, value
+from models.degradation.general_order import DegradationLaw, value
 from models.engagements.simulation import Capacity
-from models.friction.pressure_laws import AsymptoticLaw, LinearLaw
+from models.friction.pressure_laws import AsymptoticPressureLaw, LinearPressureLaw
 from models.friction.speed_protocol import REFERENCE_SPEEDS
 from models.friction.stribeck import StribeckParameters, torque
 from models.rig.hysteresis import FrictionLag
@@ -35,8 +35,8 @@ PROTOCOL_PRESSURES: FloatArray = np.linspace(4.0e5, 7.0e5, 7)
 OPEN = 1.0
 
 
-def _share(change: float, scale: float, exponent: float) -> Degradation:
-    return Degradation(initial=1.0, change=change, scale=scale, exponent=exponent)
+def _share(change: float, scale: float, exponent: float) -> DegradationLaw:
+    return DegradationLaw(initial=1.0, change=change, scale=scale, exponent=exponent)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,16 +48,20 @@ class SimulatedClutch:
     """
 
     geometry: Geometry = field(default_factory=Geometry)
-    static_torque: LinearLaw = field(default_factory=lambda: LinearLaw(intercept=1.0, slope=4.8e-5))
-    coulomb_ratio: AsymptoticLaw = field(
-        default_factory=lambda: AsymptoticLaw(asymptote=0.60, excess=4.2, decay=1.62e5)
+    static_torque: LinearPressureLaw = field(default_factory=lambda: LinearPressureLaw(intercept=1.0, slope=4.8e-5))
+    coulomb_ratio: AsymptoticPressureLaw = field(
+        default_factory=lambda: AsymptoticPressureLaw(asymptote=0.60, excess=4.2, decay=1.62e5)
     )
-    stribeck_velocity: LinearLaw = field(default_factory=lambda: LinearLaw(intercept=0.2, slope=0.96e-5))
-    viscous_coefficient: LinearLaw = field(default_factory=lambda: LinearLaw(intercept=0.1, slope=0.24e-5))
-    static_torque_course: Degradation = field(default_factory=lambda: _share(-0.66, 3700.0, 0.55))
-    coulomb_ratio_course: Degradation = field(default_factory=lambda: _share(-0.56, 4000.0, 0.80))
-    stribeck_velocity_course: Degradation = field(default_factory=lambda: _share(-0.94, 2200.0, 1.00))
-    viscous_coefficient_course: Degradation = field(default_factory=lambda: _share(1.00, 6500.0, 0.90))
+    stribeck_velocity: LinearPressureLaw = field(
+        default_factory=lambda: LinearPressureLaw(intercept=0.2, slope=0.96e-5)
+    )
+    viscous_coefficient: LinearPressureLaw = field(
+        default_factory=lambda: LinearPressureLaw(intercept=0.1, slope=0.24e-5)
+    )
+    static_torque_course: DegradationLaw = field(default_factory=lambda: _share(-0.66, 3700.0, 0.55))
+    coulomb_ratio_course: DegradationLaw = field(default_factory=lambda: _share(-0.56, 4000.0, 0.80))
+    stribeck_velocity_course: DegradationLaw = field(default_factory=lambda: _share(-0.94, 2200.0, 1.00))
+    viscous_coefficient_course: DegradationLaw = field(default_factory=lambda: _share(1.00, 6500.0, 0.90))
     lag: FrictionLag = field(default_factory=FrictionLag)
 
     def parameters(self, pressure: float | FloatArray, cycles: float | FloatArray) -> StribeckParameters:
@@ -131,20 +135,20 @@ def draw(rng: np.random.Generator) -> SimulatedClutch:
     def factor(deviation: float) -> float:
         return math.exp(deviation * float(rng.standard_normal()))
 
-    def scaled(law: LinearLaw, deviation: float) -> LinearLaw:
+    def scaled(law: LinearPressureLaw, deviation: float) -> LinearPressureLaw:
         by = factor(deviation)
-        return LinearLaw(intercept=law.intercept * by, slope=law.slope * by)
+        return LinearPressureLaw(intercept=law.intercept * by, slope=law.slope * by)
 
     rate = factor(0.15)
 
-    def course(of: Degradation) -> Degradation:
+    def course(of: DegradationLaw) -> DegradationLaw:
         change = max(float(of.change) * factor(0.04), -0.99)  # a share that stays above nothing
         return _share(change, float(of.scale) * rate * factor(0.08), float(of.exponent) * factor(0.05))
 
-    def ratio(law: AsymptoticLaw) -> AsymptoticLaw:
+    def ratio(law: AsymptoticPressureLaw) -> AsymptoticPressureLaw:
         floor = law.asymptote * factor(0.05)
         most = (0.995 - floor) * math.exp(float(PROTOCOL_PRESSURES[0]) / law.decay)
-        return AsymptoticLaw(asymptote=floor, excess=min(law.excess * factor(0.05), most), decay=law.decay)
+        return AsymptoticPressureLaw(asymptote=floor, excess=min(law.excess * factor(0.05), most), decay=law.decay)
 
     return SimulatedClutch(
         static_torque=scaled(nominal.static_torque, 0.08),

@@ -25,10 +25,10 @@ from numpy.typing import NDArray
 from models.arrays import FloatArray
 from models.degradation.general_order import ENDED, LOG_MOST
 from models.tracking.criteria import COURSE_SHARES, OTHER_SHARES, OTHER_SIZES, SHARES, SIZES
-from models.tracking.prior import Prior
+from models.tracking.prior import TrackPrior
 
 
-class Course(IntEnum):
+class CourseForm(IntEnum):
     """Which signs φ and ε have."""
 
     EQ_6 = 0
@@ -41,39 +41,43 @@ class Course(IntEnum):
     @property
     def scale_sign(self) -> float:
         """That of φ: negative where the course ends."""
-        return -1.0 if self in (Course.ENDING, Course.HYPERBOLIC) else 1.0
+        return -1.0 if self in (CourseForm.ENDING, CourseForm.HYPERBOLIC) else 1.0
 
     @property
     def exponent_sign(self) -> float:
         """That of ε."""
-        return -1.0 if self in (Course.ENDING, Course.POWER, Course.LOGARITHM) else 1.0
+        return -1.0 if self in (CourseForm.ENDING, CourseForm.POWER, CourseForm.LOGARITHM) else 1.0
 
 
 #: Signs of φ and ε by course.
-SCALE_SIGN, EXPONENT_SIGN = np.array([(course.scale_sign, course.exponent_sign) for course in Course]).T
+SCALE_SIGN, EXPONENT_SIGN = np.array([(course.scale_sign, course.exponent_sign) for course in CourseForm]).T
 #: The course by twice whether φ is positive, and once more whether ε is.
-_BY_SIGNS: NDArray[np.intp] = np.array([Course.ENDING, Course.HYPERBOLIC, Course.POWER, Course.EQ_6], dtype=np.intp)
+_BY_SIGNS: NDArray[np.intp] = np.array(
+    [CourseForm.ENDING, CourseForm.HYPERBOLIC, CourseForm.POWER, CourseForm.EQ_6], dtype=np.intp
+)
 
 #: |ε| of the two courses that have none: of the exponential, whose order is 1 and whose coordinate log φ stands for log τ,
 #: and of the logarithm, whose change is counted in units of |ε|. Chosen: as far from 1 as leaves b its digits; no table.
 _LARGE, _SMALL = 1e4, 1e-4
 #: ε where it is fixed, and φ over exp of its coordinate, by course.
-_EXPONENT = np.array([{Course.EXPONENTIAL: _LARGE, Course.LOGARITHM: -_SMALL}.get(course, np.nan) for course in Course])
-_PLAIN_SCALE = np.array([_LARGE if course is Course.EXPONENTIAL else course.scale_sign for course in Course])
+_EXPONENT = np.array(
+    [{CourseForm.EXPONENTIAL: _LARGE, CourseForm.LOGARITHM: -_SMALL}.get(course, np.nan) for course in CourseForm]
+)
+_PLAIN_SCALE = np.array([_LARGE if course is CourseForm.EXPONENTIAL else course.scale_sign for course in CourseForm])
 #: What a Δ of b is to be divided by to be that of σ [1 - (1 + ζ/φ)^-ε], by course.
-UNIT_OF_CHANGE = np.array([_SMALL if course is Course.LOGARITHM else 1.0 for course in Course])
+UNIT_OF_CHANGE = np.array([_SMALL if course is CourseForm.LOGARITHM else 1.0 for course in CourseForm])
 #: What 1 - (1 + ζ/φ)^-ε is multiplied by.
 _HEIGHT = SCALE_SIGN * EXPONENT_SIGN / UNIT_OF_CHANGE
 #: Courses whose ε is fixed: their coordinate log ε stands for nothing.
 WITHOUT_EXPONENT = ~np.isnan(_EXPONENT)
-_COURSES = np.array([course for course in Course for _ in (OTHER_SIZES if course else SIZES)], dtype=np.intp)
-_SIZES = np.concatenate([OTHER_SIZES if course else SIZES for course in Course])
+_COURSES = np.array([course for course in CourseForm for _ in (OTHER_SIZES if course else SIZES)], dtype=np.intp)
+_SIZES = np.concatenate([OTHER_SIZES if course else SIZES for course in CourseForm])
 #: Of every form its course, its size q, and whether its scatter is a share of the value.
 FORM_COURSE: NDArray[np.intp] = np.tile(_COURSES, 2)
 FORM_SIZE = np.tile(_SIZES, 2)
 FORM_PROPORTIONAL: NDArray[np.bool_] = np.repeat([False, True], _SIZES.size)
 #: Whether a form has the least discrepancy that its course may have: none beside eq. 6.
-LEAST_DISCREPANCY = np.where(FORM_COURSE == Course.EQ_6, SIZES[0], OTHER_SIZES[0]) == FORM_SIZE
+LEAST_DISCREPANCY = np.where(FORM_COURSE == CourseForm.EQ_6, SIZES[0], OTHER_SIZES[0]) == FORM_SIZE
 
 
 def basis(
@@ -106,7 +110,7 @@ def basis(
 
 
 @lru_cache(maxsize=64)
-def log_form_weight(prior: Prior) -> FloatArray:
+def log_form_weight(prior: TrackPrior) -> FloatArray:
     """Log prior probability of each form; -inf for those that the prior is sure are not."""
     home = prior.eq_6_share * np.concatenate([[prior.law_share], (1.0 - prior.law_share) * SHARES])
     other_forms = (1.0 - prior.eq_6_share) * np.outer(COURSE_SHARES, OTHER_SHARES).ravel()
@@ -132,7 +136,7 @@ def scatter_growth(form: NDArray[np.intp], relative: FloatArray) -> FloatArray:
 def course_of(scale: FloatArray, exponent: FloatArray) -> NDArray[np.intp]:
     """The course [n] of signed φ and ε, each [n]."""
     course = np.asarray(_BY_SIGNS[2 * (scale > 0.0) + (exponent > 0.0)], dtype=np.intp)
-    for fixed in (Course.EXPONENTIAL, Course.LOGARITHM):
+    for fixed in (CourseForm.EXPONENTIAL, CourseForm.LOGARITHM):
         course[exponent == _EXPONENT[fixed]] = fixed
     return course
 

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from models.arrays import FloatArray
 from models.tracking.criteria import KNEE_PACE, LEVELLING, LOG_KNEE_PACE_SD
 from models.tracking.history import History, later_epochs, span_of
-from models.tracking.prior import Prior
+from models.tracking.prior import TrackPrior
 
 #: Stretches of constant curvature: equal ones up to T, then growing ones, up to LEVELLING times T; there δ levels off.
 PAST, FUTURE = 6, 16
@@ -75,7 +75,7 @@ def _columns(progress: bytes, epoch: bytes) -> FloatArray:
     return terms
 
 
-def column_sds(prior: Prior, size: FloatArray, history: History) -> FloatArray:
+def column_sds(prior: TrackPrior, size: FloatArray, history: History) -> FloatArray:
     """Prior deviations of the further terms [n, PAST + e] of a history for discrepancies of relative size q [n]."""
     steps = history.step_sizes(prior)
     sds = np.empty((size.size, PAST + steps.size))
@@ -85,7 +85,7 @@ def column_sds(prior: Prior, size: FloatArray, history: History) -> FloatArray:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Discrepancy:
+class CourseDiscrepancy:
     """Courses beside eq. 6, one for each of n draws, in the unit of the quantity.
 
     `span` is T; `size` [n] is q; `curvature` [n, PAST + FUTURE] multiplies `smooth`; the level steps by `height`
@@ -128,7 +128,7 @@ class Discrepancy:
         """Which draws are not eq. 6 alone [n]."""
         return np.asarray((self.size > 0.0) | self.height.any(axis=1))
 
-    def taken(self, index: NDArray[np.intp]) -> "Discrepancy":
+    def taken(self, index: NDArray[np.intp]) -> "CourseDiscrepancy":
         """The courses at `index`."""
         rows = {name: getattr(self, name)[index] for name in BY_DRAW}
         return replace(self, **rows)
@@ -150,7 +150,9 @@ def _stretchwise(curvature: FloatArray, time: FloatArray) -> FloatArray:
     return np.asarray(begun.take(slope + PAST + FUTURE) + x * bent)
 
 
-def drawn(history: History, prior: Prior, size: FloatArray, terms: FloatArray, rng: np.random.Generator) -> Discrepancy:
+def drawn(
+    history: History, prior: TrackPrior, size: FloatArray, terms: FloatArray, rng: np.random.Generator
+) -> CourseDiscrepancy:
     """Courses from drawn terms [n, PAST + e] in the unit of the quantity; the future is drawn here."""
     ahead = np.zeros((size.size, FUTURE))
     alive = size > 0.0
@@ -159,7 +161,7 @@ def drawn(history: History, prior: Prior, size: FloatArray, terms: FloatArray, r
     if prior.knee_hazard > 0.0:
         knee[alive] = history.span * rng.random(int(alive.sum())) ** (-1.0 / prior.knee_hazard)
         steepening = KNEE_PACE * np.exp(LOG_KNEE_PACE_SD * rng.standard_normal(size.size))
-    return Discrepancy(
+    return CourseDiscrepancy(
         span=history.span,
         size=size,
         curvature=np.concatenate([terms[:, :PAST], ahead], axis=1),

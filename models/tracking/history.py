@@ -9,7 +9,7 @@ import numpy as np
 from models.arrays import FloatArray
 from models.tracking.criteria import LEVEL_SIZE
 from models.tracking.measurement import Measurement
-from models.tracking.prior import Prior
+from models.tracking.prior import TrackPrior
 
 #: Values are resolved to this share of the prior's deviations. Where a series is free of noise its likelihood grows
 #: without bound as the scatter vanishes, and differences of sums weighted by 1/s² would be rounding alone.
@@ -29,12 +29,12 @@ class History:
     new_levels: FloatArray
 
     @classmethod
-    def of(cls, measurements: Sequence[Measurement], prior: Prior) -> "History":
+    def of(cls, measurements: Sequence[Measurement], prior: TrackPrior) -> "History":
         """The columns of a sequence of measurements, possibly empty, with the variance of their resolution added."""
         rows = np.array([_row(m, prior) for m in measurements], dtype=np.float64).reshape(-1, 5)
         return cls(**{field.name: rows[:, column].copy() for column, field in enumerate(fields(cls))})
 
-    def append(self, measurement: Measurement, prior: Prior) -> "History":
+    def append(self, measurement: Measurement, prior: TrackPrior) -> "History":
         """A history with one more measurement."""
         row = zip(fields(self), _row(measurement, prior), strict=True)
         return History(**{field.name: np.append(getattr(self, field.name), number) for field, number in row})
@@ -50,7 +50,7 @@ class History:
         begun = [self.progress[self.epoch >= epoch].min() for epoch in later_epochs(self.epoch)]
         return np.array(begun, dtype=np.float64)
 
-    def step_sizes(self, prior: Prior) -> FloatArray:
+    def step_sizes(self, prior: TrackPrior) -> FloatArray:
         """The deviations of these steps, as shares of the size of the quantity [e]."""
         return step_sizes(self.epoch, self.new_levels, prior.step_size)
 
@@ -82,7 +82,7 @@ def step_sizes(epoch: FloatArray, new_levels: FloatArray, step_size: float) -> F
     return np.where(np.diff(known) > 0, LEVEL_SIZE, step_size)
 
 
-def _row(measurement: Measurement, prior: Prior) -> tuple[float, ...]:
+def _row(measurement: Measurement, prior: TrackPrior) -> tuple[float, ...]:
     resolution = _RESOLUTION * math.hypot(prior.initial_sd, prior.change_sd)
     variance = measurement.variance + resolution**2
     return measurement.progress, measurement.value, variance, measurement.epoch, measurement.new_levels

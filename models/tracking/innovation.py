@@ -22,11 +22,11 @@ from scipy.special import log_ndtr, ndtri_exp
 from models.gaussian_evidence import log_normal
 from models.tracking.criteria import FEWEST_BEFORE
 from models.tracking.measurement import Measurement
-from models.tracking.posterior import Posterior
-from models.tracking.prior import Prior
+from models.tracking.posterior import TrackPosterior
+from models.tracking.prior import TrackPrior
 
 
-def last_innovation(posterior: Posterior, measurements: Sequence[Measurement], prior: Prior) -> float | None:
+def last_innovation(posterior: TrackPosterior, measurements: Sequence[Measurement], prior: TrackPrior) -> float | None:
     """The innovation of the last of `measurements`, all of which `posterior` is conditioned on; infinite beyond what a float
     can express.
 
@@ -37,7 +37,7 @@ def last_innovation(posterior: Posterior, measurements: Sequence[Measurement], p
     return innovation(posterior, measurements[-1], prior)
 
 
-def innovation(posterior: Posterior, last: Measurement, prior: Prior) -> float:
+def innovation(posterior: TrackPosterior, last: Measurement, prior: TrackPrior) -> float:
     """How far the last measurement lies off the prediction of those before it, in deviations with its sign.
 
     `posterior` is conditioned on all of them; `prior` says how often a run is outlying and by how much.

@@ -20,7 +20,7 @@ from models.tracking.courses import FORM_COURSE, FORM_PROPORTIONAL, FORM_SIZE, b
 from models.tracking.discrepancy import PAST, column_sds, columns, smooth
 from models.tracking.history import History, later_epochs
 from models.tracking.merged_tests import MergedHistory
-from models.tracking.prior import Prior
+from models.tracking.prior import TrackPrior
 
 #: Which of N of the columns (1, y, b) each sum loses the product of.
 _SUMS = ("r", "ry", "rb", "ryy", "rby", "rbb")
@@ -44,7 +44,7 @@ class Sums:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Points:
+class EvaluationPoints:
     """Where the closed form is taken: log |φ|, log |ε|, log s, the form (`courses`) [n]; which runs are outlying [t, n]."""
 
     log_scale: FloatArray
@@ -83,7 +83,7 @@ class Terms:
         return np.swapaxes(self.rows[:, self.rows.shape[0] :], 0, 1)
 
 
-def evidence(sums: Sums, prior: Prior) -> FloatArray:
+def evidence(sums: Sums, prior: TrackPrior) -> FloatArray:
     """Log probability of the data given φ, ε, s and q, with ξ0, Δ and the further terms integrated out.
 
     -½ [Σ log(2π/r) + log|M| + log|A| + log(σ0² σΔ²) + Σ r y² + E[Δ]²/σΔ² - cᵀ A⁻¹ c], where A is the posterior precision of
@@ -103,7 +103,7 @@ def evidence(sums: Sums, prior: Prior) -> FloatArray:
     return pull
 
 
-def drawn_pair(sums: Sums, prior: Prior, normals: FloatArray) -> tuple[FloatArray, FloatArray]:
+def drawn_pair(sums: Sums, prior: TrackPrior, normals: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Draws of (ξ0, Δ) given φ, ε, s and q, each [n], from standard normals [n, 2]."""
     pivot, pull = _eliminate(sums, prior)
     a00 = sums.r + prior.initial_sd**-2
@@ -117,7 +117,7 @@ def drawn_pair(sums: Sums, prior: Prior, normals: FloatArray) -> tuple[FloatArra
     return initial + initial_sd * normals[:, 0], change + (lean * normals[:, 0] + remaining_sd * normals[:, 1])
 
 
-def _eliminate(sums: Sums, prior: Prior) -> tuple[FloatArray, FloatArray]:
+def _eliminate(sums: Sums, prior: TrackPrior) -> tuple[FloatArray, FloatArray]:
     """The precision of Δ once ξ0 is eliminated, and what pulls at it: Δ is their ratio."""
     least = prior.change_sd**-2
     lean = sums.rb / (sums.r + prior.initial_sd**-2)
@@ -130,7 +130,7 @@ def _eliminate(sums: Sums, prior: Prior) -> tuple[FloatArray, FloatArray]:
     return pivot, pull
 
 
-def log_outlying(prior: Prior, outlying: FloatArray | NDArray[np.bool_]) -> FloatArray:
+def log_outlying(prior: TrackPrior, outlying: FloatArray | NDArray[np.bool_]) -> FloatArray:
     """Log prior probability of which runs are outlying, along the first axis of [t, ...]."""
     count = outlying.sum(axis=0)
     if prior.outlying_share == 0.0:
@@ -139,7 +139,9 @@ def log_outlying(prior: Prior, outlying: FloatArray | NDArray[np.bool_]) -> Floa
     return np.asarray(count * math.log(prior.outlying_share) + sound * math.log1p(-prior.outlying_share))
 
 
-def pointwise(history: History, prior: Prior, points: Points, table: FloatArray | None = None) -> tuple[Sums, Terms]:
+def pointwise(
+    history: History, prior: TrackPrior, points: EvaluationPoints, table: FloatArray | None = None
+) -> tuple[Sums, Terms]:
     """The sums at n points, each [n], and the further terms after elimination; `table` may hold their b [t, n]."""
     if history.value.size > WHOLE and table is None and not isinstance(history, MergedHistory):
         return _in_blocks(history, prior, points)
@@ -174,7 +176,7 @@ def pointwise(history: History, prior: Prior, points: Points, table: FloatArray 
     return _without(sums, terms), terms
 
 
-def _in_blocks(history: History, prior: Prior, points: Points) -> tuple[Sums, Terms]:
+def _in_blocks(history: History, prior: TrackPrior, points: EvaluationPoints) -> tuple[Sums, Terms]:
     """`pointwise` of a long history: the same but for rounding, by blocks of points that stay in the processor's cache.
 
     On one of the stretches of δ, within an epoch, the columns Z are parabolas of progress: Z = P A with P = (1, v, v²). So
@@ -266,7 +268,7 @@ def _parabolas(progress: FloatArray, y: FloatArray, epoch: FloatArray, *, span: 
 
 
 def solve_again(
-    history: History, prior: Prior, points: Points, index: NDArray[np.intp], sums: Sums, terms: Terms
+    history: History, prior: TrackPrior, points: EvaluationPoints, index: NDArray[np.intp], sums: Sums, terms: Terms
 ) -> None:
     """Put `pointwise` of changed points [k], which stand at `index` [k] and kept their sizes q, in its place."""
     own_sums, own_terms = pointwise(history, prior, points)
@@ -287,7 +289,9 @@ def solved_at(solved: tuple[Sums, Terms], index: NDArray[np.intp]) -> tuple[Sums
     return taken, Terms(where=where, sd=terms.sd[:, columns_at], rows=terms.rows[:, :, columns_at])
 
 
-def last_outlying(history: History, prior: Prior, points: Points, sums: Sums, terms: Terms, last: FloatArray) -> Sums:
+def last_outlying(
+    history: History, prior: TrackPrior, points: EvaluationPoints, sums: Sums, terms: Terms, last: FloatArray
+) -> Sums:
     """The sums and where the last run, whose b is `last` [n], is taken to be outlying and was not before.
 
     It gets a further term of its own with the deviation W, which is eliminated after the others.
@@ -321,7 +325,7 @@ def _log_product(d: FloatArray) -> FloatArray:
 
 def tabulated(
     history: History,
-    prior: Prior,
+    prior: TrackPrior,
     table: FloatArray,
     log_scatter: FloatArray,
     form: NDArray[np.intp],
@@ -390,7 +394,7 @@ def drawn_terms(terms: Terms, off_initial: FloatArray, change: FloatArray, norma
     return drawn
 
 
-def _disturbed(prior: Prior, size: FloatArray, history: History) -> tuple[NDArray[np.intp], FloatArray]:
+def _disturbed(prior: TrackPrior, size: FloatArray, history: History) -> tuple[NDArray[np.intp], FloatArray]:
     """Which of the sizes q [n] have further terms, and the prior deviations σ of these [p, j]."""
     where = np.flatnonzero(size > 0.0) if history.steps.size == 0 else np.arange(size.size)
     return where, column_sds(prior, size[where], history).T

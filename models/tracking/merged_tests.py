@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from models.arrays import FloatArray
 from models.tracking.criteria import DOUBTFUL, LINEAR, LOGARITHMIC, MAX_APART, MAX_SPLIT, NEWEST, SPLIT_FROM, UNMERGED
 from models.tracking.history import History
-from models.tracking.prior import Prior
+from models.tracking.prior import TrackPrior
 
 #: Tests on either side of one that say where it should lie, and that say how far tests scatter.
 _BESIDE, _ABOUT = 5, 100
@@ -51,7 +51,7 @@ class MergedHistory(History):
         return np.asarray(self.count == 1.0)
 
 
-def merged(history: History, prior: Prior) -> History:
+def merged(history: History, prior: TrackPrior) -> History:
     """The history with its older tests merged; unchanged if it has no more than UNMERGED tests."""
     if history.value.size <= UNMERGED:
         return history
@@ -93,7 +93,7 @@ def merged(history: History, prior: Prior) -> History:
 
 
 def judged(
-    value: FloatArray, variance: FloatArray, epoch: FloatArray, prior: Prior
+    value: FloatArray, variance: FloatArray, epoch: FloatArray, prior: TrackPrior
 ) -> tuple[FloatArray, NDArray[np.bool_], NDArray[np.bool_]]:
     """Of tests by ascending progress the variance beside their own, which are not merged, and which of the others are taken
     to be outlying; each [t]."""
@@ -142,7 +142,7 @@ def _medians(values: FloatArray, beside: int, stride: int = 1) -> FloatArray:
     return np.asarray(medians[np.clip((np.arange(values.size) - half) // stride, 0, medians.size - 1)])
 
 
-def _log_odds(off: FloatArray, variance: FloatArray, prior: Prior) -> FloatArray:
+def _log_odds(off: FloatArray, variance: FloatArray, prior: TrackPrior) -> FloatArray:
     """Log odds that tests so far off a course [t] with that variance [t] are outlying."""
     if prior.outlying_share == 0.0:
         return np.full(off.size, -np.inf)

@@ -17,7 +17,7 @@ from models.tracking.discrepancy import column_sds, columns
 from models.tracking.history import History
 from models.tracking.linear_model import log_outlying
 from models.tracking.merged_tests import MergedHistory
-from models.tracking.prior import Prior
+from models.tracking.prior import TrackPrior
 
 #: Nodes of each level of s at which turning a run is weighed up, and the power of their mass by which they are drawn.
 NODES, TEMPER = 16, 0.25
@@ -42,7 +42,7 @@ def _most_examined(history: History) -> int:
     return 4 if isinstance(history, MergedHistory) else 24
 
 
-def verdicts(prior: Prior, history: History, outlying: FloatArray, nodes: Nodes) -> tuple[FloatArray, FloatArray]:
+def verdicts(prior: TrackPrior, history: History, outlying: FloatArray, nodes: Nodes) -> tuple[FloatArray, FloatArray]:
     """By how much the log posterior at every node would change if a run were turned [n, t], and the log probability of the
     data at the node [n]; for sets of outlying runs, one for all [t] or one a node [n, t], of 0 and 1.
 
@@ -82,14 +82,14 @@ def verdicts(prior: Prior, history: History, outlying: FloatArray, nodes: Nodes)
     return gain, -0.5 * (log_volume + quadratic)
 
 
-def gains(prior: Prior, history: History, outlying: FloatArray, nodes: Nodes) -> FloatArray:
+def gains(prior: TrackPrior, history: History, outlying: FloatArray, nodes: Nodes) -> FloatArray:
     """By how much turning each run [t] of one set [t] would change the log posterior, the nodes summed over."""
     total = nodes.log_weight[:, None] + verdicts(prior, history, outlying, nodes)[0]
     top = total.max(axis=0)
     return np.asarray(top + np.log(np.exp(total - top).sum(axis=0)))
 
 
-def at_once(prior: Prior, history: History, outlying: FloatArray, nodes: Nodes) -> tuple[FloatArray, FloatArray]:
+def at_once(prior: TrackPrior, history: History, outlying: FloatArray, nodes: Nodes) -> tuple[FloatArray, FloatArray]:
     """The set [n, t] that each node arrives at by repeatedly turning all the runs that it would turn, from `outlying` [t];
     and a lower bound of that set's gain in log posterior, summed over nodes.
 
@@ -107,16 +107,16 @@ def at_once(prior: Prior, history: History, outlying: FloatArray, nodes: Nodes) 
 
 
 @dataclass(slots=True)
-class Search:
+class OutlierSearch:
     """The sets examined so far, as bytes of their flags [t], with their log probability."""
 
-    prior: Prior
+    prior: TrackPrior
     history: History
     log_probability: dict[bytes, float]
     expanded: set[bytes]
 
     @classmethod
-    def begun(cls, prior: Prior, history: History) -> "Search":
+    def begun(cls, prior: TrackPrior, history: History) -> "OutlierSearch":
         """A search that begins from the empty set."""
         none = np.zeros(history.value.size)
         return cls(prior=prior, history=history, log_probability={none.tobytes(): 0.0}, expanded=set())

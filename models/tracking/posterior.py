@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
-from models.degradation.general_order import Degradation
+from models.degradation.general_order import DegradationLaw
 from models.tracking.courses import UNIT_OF_CHANGE, basis, coordinates_of, course_of, form_of
-from models.tracking.discrepancy import BY_DRAW, Discrepancy
+from models.tracking.discrepancy import BY_DRAW, CourseDiscrepancy
 from models.tracking.measurement import Measurement
-from models.tracking.prior import Prior
+from models.tracking.prior import TrackPrior
 
 
 class SampleStatus(StrEnum):
@@ -30,13 +30,14 @@ class SampleStatus(StrEnum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Posterior:
+class TrackPosterior:
     """A weighted sample of eq. 6's coefficients, all arrays [n]; weight >= 0 sums to one.
 
     `scatter` is the deviation from run to run, in the unit of the quantity; where it is `proportional` (None: nowhere), that
     of a value of the prior's size. `discrepancy` is the deviation of each draw from its course, if there is one; `branch`
     which series of measurements a draw was tracked under, where there are several (`mixture`). From these follow, of every
-    draw, the `course` (`courses.Course`), and log φ and log ε as the priors know them (`courses.coordinates_of`), each [n].
+    draw, the `course` (`courses.CourseForm`), and log φ and log ε as the priors know them
+    (`courses.coordinates_of`), each [n].
     """
 
     weight: FloatArray
@@ -46,7 +47,7 @@ class Posterior:
     exponent: FloatArray
     scatter: FloatArray
     proportional: NDArray[np.bool_] | None = None
-    discrepancy: Discrepancy | None = None
+    discrepancy: CourseDiscrepancy | None = None
     branch: NDArray[np.intp] | None = None
     course: NDArray[np.intp] = field(init=False, repr=False, compare=False)
     log_scale: FloatArray = field(init=False, repr=False, compare=False)
@@ -77,9 +78,9 @@ class Posterior:
         return form_of(self.course, size, none > 0.0 if self.proportional is None else self.proportional)
 
     @property
-    def degradation(self) -> Degradation:
+    def degradation(self) -> DegradationLaw:
         """The sample as coefficients of eq. 6, each [n]."""
-        return Degradation(initial=self.initial, change=self.change, scale=self.scale, exponent=self.exponent)
+        return DegradationLaw(initial=self.initial, change=self.change, scale=self.scale, exponent=self.exponent)
 
     def values(self, progress: FloatArray) -> FloatArray:
         """ξ at progress ζ >= 0 [k], or [k, n] where draws differ, discrepancy and all; [k, n]."""
@@ -119,13 +120,13 @@ class Posterior:
         cliff = (self.scale < 0.0) & (self.exponent > -1.0) & (self.change < 0.0)
         return np.where(cliff, np.abs(self.scale), np.inf)
 
-    def scatter_variance(self, value: float, prior: Prior) -> FloatArray:
+    def scatter_variance(self, value: float, prior: TrackPrior) -> FloatArray:
         """The variance of the scatter from run to run at a value, by draw [n]."""
         if self.proportional is None:
             return np.square(self.scatter)
         return np.asarray(np.square(self.scatter) * np.where(self.proportional, prior.relative_squared(value), 1.0))
 
-    def taken(self, index: NDArray[np.intp], weight: FloatArray) -> "Posterior":
+    def taken(self, index: NDArray[np.intp], weight: FloatArray) -> "TrackPosterior":
         """The draws at `index`, with new weights."""
         columns = ("initial", "change", "scale", "exponent", "scatter", "proportional", "branch")
         rows = {name: getattr(self, name) for name in columns}
@@ -139,7 +140,7 @@ class Posterior:
             return offsets[:1].T
         return np.asarray(offsets[self.branch].T)
 
-    def of_branch(self, branch: int) -> "Posterior":
+    def of_branch(self, branch: int) -> "TrackPosterior":
         """The draws of one branch."""
         if self.branch is None:
             return self
@@ -152,13 +153,13 @@ class Posterior:
         return mean, math.sqrt(max(0.0, float(self.weight @ np.square(sample - mean))))
 
 
-def joined(parts: Sequence[Posterior]) -> Posterior:
+def joined(parts: Sequence[TrackPosterior]) -> TrackPosterior:
     """The draws of all parts, which have one history of progress, one after the other, with their weights."""
-    names = [field.name for field in fields(Posterior) if field.init]
-    return Posterior(**{name: _joined([getattr(part, name) for part in parts]) for name in names})
+    names = [field.name for field in fields(TrackPosterior) if field.init]
+    return TrackPosterior(**{name: _joined([getattr(part, name) for part in parts]) for name in names})
 
 
-def mixture(parts: Sequence[tuple[float, Posterior]]) -> Posterior:
+def mixture(parts: Sequence[tuple[float, TrackPosterior]]) -> TrackPosterior:
     """Posteriors under several series of measurements as one: part i has its weight and is branch i."""
     weighted = [
         replace(part, weight=weight * part.weight, branch=np.full(part.weight.size, branch))
@@ -170,9 +171,9 @@ def mixture(parts: Sequence[tuple[float, Posterior]]) -> Posterior:
 def _joined(columns: Sequence[Any]) -> Any:
     """Columns one after the other, of discrepancies those that have a row a draw; what they share stays."""
     first = columns[0]
-    if isinstance(first, Discrepancy):
+    if isinstance(first, CourseDiscrepancy):
         rows = {name: np.concatenate([getattr(column, name) for column in columns]) for name in BY_DRAW}
-        return Discrepancy(span=first.span, at=first.at, **rows)
+        return CourseDiscrepancy(span=first.span, at=first.at, **rows)
     return None if first is None else np.concatenate(columns)
 
 
@@ -186,11 +187,11 @@ class Tracker(Protocol[State]):
     def name(self) -> str:
         """What the public contract calls it: `grid`, `particle` or `ukf`."""
 
-    def start(self, prior: Prior) -> State:
+    def start(self, prior: TrackPrior) -> State:
         """The state before the first measurement."""
 
     def update(self, state: State, measurement: Measurement, rng: np.random.Generator) -> State:
         """The state after one more measurement; measurements may come in any order of progress."""
 
-    def posterior(self, state: State, size: int, rng: np.random.Generator) -> Posterior:
+    def posterior(self, state: State, size: int, rng: np.random.Generator) -> TrackPosterior:
         """About `size` weighted draws of the coefficients given all measurements so far."""

@@ -17,7 +17,7 @@ from models.tracking.measurement import Measurement
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Prior:
+class TrackPrior:
     """Means and deviations; ξ0, Δ and the scatter in the unit of the quantity, φ in cycles.
 
     `outlying_share` of the runs are off by a further normal of deviation `outlying_size`, `law_share` is the probability
@@ -77,7 +77,7 @@ class Prior:
         return np.array(astuple(self), dtype=np.float64)
 
     @classmethod
-    def from_array(cls, numbers: FloatArray) -> "Prior":
+    def from_array(cls, numbers: FloatArray) -> "TrackPrior":
         """The inverse of `to_array`."""
         return cls(**{field.name: float(x) for field, x in zip(fields(cls), numbers, strict=True)})
 
@@ -95,7 +95,7 @@ class Prior:
         )
 
 
-def weak(first: Measurement, *, falling: bool) -> Prior:
+def weak(first: Measurement, *, falling: bool) -> TrackPrior:
     """A weak prior: little more than the size of the quantity, taken from its first measurement.
 
     With the size a = √(value² + variance): ξ0 is within some 50 % of a, for the first run need not be at ζ = 0. The
@@ -106,7 +106,7 @@ def weak(first: Measurement, *, falling: bool) -> Prior:
     """
     size = math.hypot(first.value, math.sqrt(first.variance)) or 1.0
     change_mean, change_sd = (-0.6, 0.4) if falling else (0.0, 1.0)
-    return Prior(
+    return TrackPrior(
         initial_mean=first.value,
         initial_sd=0.5 * size,
         change_mean=change_mean * size,

@@ -15,9 +15,9 @@ from models.arrays import FloatArray
 from models.tracking.courses import FORM_PROPORTIONAL, UNIT_OF_CHANGE, coefficients_at
 from models.tracking.discrepancy import PAST, drawn
 from models.tracking.history import History
-from models.tracking.linear_model import Points, Sums, Terms, drawn_pair, drawn_terms
-from models.tracking.posterior import Posterior
-from models.tracking.prior import Prior
+from models.tracking.linear_model import EvaluationPoints, Sums, Terms, drawn_pair, drawn_terms
+from models.tracking.posterior import TrackPosterior
+from models.tracking.prior import TrackPrior
 
 
 def systematic(weight: FloatArray, size: int, offset: float) -> NDArray[np.intp]:
@@ -47,7 +47,7 @@ def tempered(weight: FloatArray, log_factor: FloatArray, fewest: float = 60) -> 
         off = 0.8 * off
 
 
-def thinned(sample: Posterior, size: int, offset: float) -> Posterior:
+def thinned(sample: TrackPosterior, size: int, offset: float) -> TrackPosterior:
     """A weighted sample reduced to `size` draws of equal weight."""
     return sample.taken(systematic(sample.weight, size, offset), np.full(size, 1.0 / size))
 
@@ -78,13 +78,13 @@ def spread_normals(size: int, offset: FloatArray) -> FloatArray:
 
 def with_linear_terms(
     history: History,
-    prior: Prior,
-    points: Points,
+    prior: TrackPrior,
+    points: EvaluationPoints,
     solved: tuple[Sums, Terms],
     weight: FloatArray,
     normals: FloatArray,
     rng: np.random.Generator,
-) -> Posterior:
+) -> TrackPosterior:
     """Points of weights [n] that sum to one, with what is linear drawn given each: ξ0 and Δ by standard normals [n, 2], the
     discrepancy and the steps by `rng`. `solved` is `linear_model.pointwise` of the points."""
     sums, terms = solved
@@ -92,7 +92,7 @@ def with_linear_terms(
     further = rng.standard_normal((weight.size, PAST + history.steps.size))
     further = drawn_terms(terms, initial - prior.initial_mean, change, further)
     scale, exponent = coefficients_at(points.log_scale, points.log_exponent, points.course)
-    return Posterior(
+    return TrackPosterior(
         weight=weight,
         initial=initial,
         change=change / UNIT_OF_CHANGE[points.course],

@@ -19,7 +19,7 @@ from sqlalchemy import Connection
 
 from service.alarms import notify, raising
 from service.alarms.receivers import Attempt
-from service.schemas.clutch import ClutchIn
+from service.api.clutch import ClutchIn
 from service.settings import Settings
 from storage import alarms, clutches, keys, webhooks
 from storage.engine.database import Database

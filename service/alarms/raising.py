@@ -14,11 +14,11 @@ from typing import Any
 from sqlalchemy import Connection
 
 from service.alarms import rules
-from service.alarms.rules import Facts, Finding
-from service.lives.condition import state_of
-from service.schemas.alarm import AlarmIn, EventOut
-from service.schemas.base import schema_fields
-from service.schemas.clutch import ClutchIn
+from service.alarms.rules import ClutchFacts, Finding
+from service.api.alarm import AlarmIn, EventOut
+from service.api.base import schema_fields
+from service.api.clutch import ClutchIn
+from service.clutch.condition import state_of
 from storage import alarms, clutches, webhooks
 from storage.alarms import AlarmRow, EventRow
 from storage.clutches import ClutchRow
@@ -45,7 +45,7 @@ def evaluate(connection: Connection, clutch_id: str) -> None:
     clutch_rules = [(rule_row, rule) for rule_row, rule in clutch_rules if concerns(rule, record)]
     still_raised: set[str] = set()
     for of_silence in (True, False):  # a silent rig is a state, which other rules look at
-        facts = Facts(connection=connection, clutch=row, geometry=record.geometry.to_model(), now=at)
+        facts = ClutchFacts(connection=connection, clutch=row, geometry=record.geometry.to_model(), now=at)
         for rule_row, rule in clutch_rules:
             if (rule.quantity == SILENT) is of_silence:
                 still_raised |= _judged(rule_row, rule, facts, before.get(rule_row.alarm_id))
@@ -110,7 +110,7 @@ def test_event(row: AlarmRow) -> EventRow:
     )
 
 
-def _judged(row: AlarmRow, rule: AlarmIn, facts: Facts, before: EventRow | None) -> set[str]:
+def _judged(row: AlarmRow, rule: AlarmIn, facts: ClutchFacts, before: EventRow | None) -> set[str]:
     """Raise an alarm where its rule does; the rule's name where an alarm that was there stays."""
     finding = rules.finding(rule, facts)
     if finding is None:
@@ -131,7 +131,7 @@ def _is_of(event: EventRow, rule: AlarmIn, finding: Finding) -> bool:
     return (event.quantity, event.mark) == (rule.quantity, finding.mark)
 
 
-def _raise(row: AlarmRow, rule: AlarmIn, facts: Facts, finding: Finding) -> None:
+def _raise(row: AlarmRow, rule: AlarmIn, facts: ClutchFacts, finding: Finding) -> None:
     content: Json = {
         "name": rule.name,
         "value": finding.value,
@@ -152,7 +152,7 @@ def _raise(row: AlarmRow, rule: AlarmIn, facts: Facts, finding: Finding) -> None
     _tell(facts.connection, RAISED, new.event_id, of_cleared=False)
 
 
-def _reopened(row: AlarmRow, rule: AlarmIn, facts: Facts, finding: Finding) -> bool:
+def _reopened(row: AlarmRow, rule: AlarmIn, facts: ClutchFacts, finding: Finding) -> bool:
     """Whether the alarm is one that the declared end of this life has cleared, and the end was taken back: it goes on, and
     only receivers that were sent that it was over are sent it again."""
     connection = facts.connection
@@ -168,7 +168,7 @@ def _reopened(row: AlarmRow, rule: AlarmIn, facts: Facts, finding: Finding) -> b
     return False
 
 
-def _clear(event: EventRow, facts: Facts) -> None:
+def _clear(event: EventRow, facts: ClutchFacts) -> None:
     ended = {} if facts.summary.get("ended") is None else {_ENDED_LIFE: facts.summary.get("life", "")}
     content = {name: value for name, value in event.content.items() if name != _ENDED_LIFE}
     alarms.clear(facts.connection, event.event_id, facts.now, content | ended)
@@ -182,7 +182,7 @@ def _tell(connection: Connection, kind: str, event_id: str, *, of_cleared: bool)
         to_receivers(connection, kind, event, [row for row in receivers if row.content["cleared"] or not of_cleared])
 
 
-def _with_silence(facts: Facts, kept: set[str]) -> ClutchRow:
+def _with_silence(facts: ClutchFacts, kept: set[str]) -> ClutchRow:
     """The clutch with since when its rig is silent; `kept` are the alarms of silence, which were judged alone so far."""
     row, silent = facts.clutch, facts.heard() if kept else None
     if silent is None and row.silent is None:

@@ -13,13 +13,14 @@ from sqlalchemy import Connection
 from models.clutch import Geometry
 from models.friction.stribeck import PARAMETER_NAMES, StribeckParameters, slope, slope_gradient
 from models.prognosis.first_passage import PassageStatus
-from service.columns import RADIANS_PER_SECOND_PER_RPM, bar
-from service.lives import condition
-from service.lives.assumptions import ALL_PRESSURES
-from service.lives.history import STATIONARY
-from service.lives.payloads import ENDED, INSUFFICIENT, OFF_TRACK
-from service.lives.plausibility.doubts import OFF_COURSE
-from service.schemas.alarm import AlarmIn
+from service.api.alarm import AlarmIn
+from service.channels import RADIANS_PER_SECOND_PER_RPM, bar
+from service.clutch import condition
+from service.clutch.assumptions import ALL_PRESSURES
+from service.clutch.items import ENDED, INSUFFICIENT
+from service.clutch.notices import OFF_TRACK
+from service.clutch.plausibility.doubts import OFF_COURSE
+from service.clutch.timeline import STATIONARY
 from storage import alarms, diagnoses, results, runs
 from storage.clutches import ClutchRow
 from storage.results import FitRow
@@ -30,7 +31,7 @@ _SAFE = 0.05
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Facts:
+class ClutchFacts:
     """What is stored of a clutch now, as rules look at it; what few rules need is read when one does."""
 
     connection: Connection
@@ -61,7 +62,7 @@ class Finding:
     mark: str = ""
 
 
-def finding(rule: AlarmIn, facts: Facts) -> Finding | None:
+def finding(rule: AlarmIn, facts: ClutchFacts) -> Finding | None:
     """What a rule finds of a clutch; None where there is nothing to compare."""
     return _QUANTITIES[rule.quantity](rule, facts)
 
@@ -75,7 +76,7 @@ def passes(rule: AlarmIn, result: Finding, hysteresis: float = 0.0) -> bool:
     return rule.above is not None and result.value > rule.above - hysteresis * abs(rule.above)
 
 
-def message(rule: AlarmIn, facts: Facts, result: Finding) -> str:
+def message(rule: AlarmIn, facts: ClutchFacts, result: Finding) -> str:
     """An alarm as a sentence, with how many runs are held beside it."""
     unit, held_count = _UNITS.get(rule.quantity), facts.summary.get("held", 0)
     limit = "" if rule.limit is None or unit is None else f" (limit: {rule.limit:,.6g}{unit})"
@@ -98,7 +99,7 @@ def slope_quantile(rule: AlarmIn, fit: FitRow, geometry: Geometry) -> float | No
     return margin / geometry.torque_per_cof(fit.mean_pressure)
 
 
-def _remaining(rule: AlarmIn, facts: Facts) -> float | None:
+def _remaining(rule: AlarmIn, facts: ClutchFacts) -> float | None:
     """The remaining cycles at the rule's quantile; None where nothing is known, or they are beyond the horizon."""
     summary = facts.summary
     if summary.get("status", INSUFFICIENT) in (INSUFFICIENT, ENDED):
@@ -113,7 +114,7 @@ def _remaining(rule: AlarmIn, facts: Facts) -> float | None:
     return None if cycles is None else float(cycles)
 
 
-def _remaining_cycles(rule: AlarmIn, facts: Facts) -> Finding | None:
+def _remaining_cycles(rule: AlarmIn, facts: ClutchFacts) -> Finding | None:
     value = _remaining(rule, facts)
     return None if value is None else Finding(value=value, words=_left(rule, value))
 
@@ -124,7 +125,7 @@ def _left(rule: AlarmIn, cycles: float) -> str:
     return f"{condition.chance_in_words(1.0 - rule.probability)} chance of {cycles:,.0f} or more cycles"
 
 
-def _remaining_days(rule: AlarmIn, facts: Facts) -> Finding | None:
+def _remaining_days(rule: AlarmIn, facts: ClutchFacts) -> Finding | None:
     value, pace = _remaining(rule, facts), facts.summary.get("pace")
     if value is None or pace is None:
         return None
@@ -132,14 +133,14 @@ def _remaining_days(rule: AlarmIn, facts: Facts) -> Finding | None:
     return Finding(value=days, words=f"{_left(rule, value)}: {condition.pace_in_words(pace, value)}")
 
 
-def _health(_rule: AlarmIn, facts: Facts) -> Finding | None:
+def _health(_rule: AlarmIn, facts: ClutchFacts) -> Finding | None:
     health = (facts.summary.get("current") or {}).get("health")
     if health is None or facts.summary.get("status") == ENDED:
         return None
     return Finding(value=float(health), words=f"health {health:.0%}")
 
 
-def _shudder_margin(rule: AlarmIn, facts: Facts) -> Finding | None:
+def _shudder_margin(rule: AlarmIn, facts: ClutchFacts) -> Finding | None:
     """The least slope dμ/dv over the pressures of the newest stationary test (by cycles), if it counts and has curves, at
     the quantile of its standard error."""
     newest = runs.newest_fitted(facts.connection, facts.clutch_id, STATIONARY)
@@ -157,14 +158,14 @@ def _shudder_margin(rule: AlarmIn, facts: Facts) -> Finding | None:
     )
 
 
-def _held_runs(_rule: AlarmIn, facts: Facts) -> Finding | None:
+def _held_runs(_rule: AlarmIn, facts: ClutchFacts) -> Finding | None:
     count = facts.summary.get("held", 0)
     return Finding(
         value=float(count), words=f"{count} held {'run waits' if count == 1 else 'runs wait'} for a decision"
     )
 
 
-def _off_course(_rule: AlarmIn, facts: Facts) -> Finding | None:
+def _off_course(_rule: AlarmIn, facts: ClutchFacts) -> Finding | None:
     """Why the newest test is off its course: the warning of the prediction, or the doubt of a held run."""
     newest = results.prediction_at(facts.connection, facts.clutch_id, condition.SHOWN, ALL_PRESSURES)
     notices = [] if newest is None else [notice for notice in newest.payload["warnings"] if notice["code"] == OFF_TRACK]
@@ -173,7 +174,7 @@ def _off_course(_rule: AlarmIn, facts: Facts) -> Finding | None:
     return Finding(value=None, words=f"off course: {notices[0]['message']}") if notices else None
 
 
-def _verdict(rule: AlarmIn, facts: Facts) -> Finding | None:
+def _verdict(rule: AlarmIn, facts: ClutchFacts) -> Finding | None:
     newest = diagnoses.newest(facts.connection, [facts.clutch_id]).get(facts.clutch_id)
     verdicts = tuple(condition.DISAGREES) if rule.any_of is None else rule.any_of
     if newest is None or newest.adopted or newest.verdict not in verdicts:
@@ -185,7 +186,7 @@ def _verdict(rule: AlarmIn, facts: Facts) -> Finding | None:
     return Finding(value=None, words=f"the newest diagnosis says: {words}", mark=f"{newest.verdict}:{causes}")
 
 
-def _state(rule: AlarmIn, facts: Facts) -> Finding | None:
+def _state(rule: AlarmIn, facts: ClutchFacts) -> Finding | None:
     state = condition.state_of(facts.summary, disputed=facts.clutch.is_disputed, silent=facts.clutch.silent)
     name = state["name"]
     if name not in (rule.any_of or [other for other in condition.STATE_WORDS if other != condition.NORMAL]):
@@ -195,7 +196,7 @@ def _state(rule: AlarmIn, facts: Facts) -> Finding | None:
     return Finding(value=None, words=f"{condition.STATE_WORDS[name].lower()}: {'; '.join(clauses)}", mark=name)
 
 
-def _silent_hours(_rule: AlarmIn, facts: Facts) -> Finding | None:
+def _silent_hours(_rule: AlarmIn, facts: ClutchFacts) -> Finding | None:
     heard = facts.heard()
     if heard is None or facts.summary.get("status") == ENDED:
         return None
@@ -204,7 +205,7 @@ def _silent_hours(_rule: AlarmIn, facts: Facts) -> Finding | None:
     return Finding(value=hours, words=condition.silence_in_words(heard))
 
 
-_QUANTITIES: dict[str, Callable[[AlarmIn, Facts], Finding | None]] = {
+_QUANTITIES: dict[str, Callable[[AlarmIn, ClutchFacts], Finding | None]] = {
     "remaining_cycles": _remaining_cycles,
     "remaining_days": _remaining_days,
     "health": _health,

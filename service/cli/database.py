@@ -83,14 +83,14 @@ def replay(
 
     A clutch with a run that this code cannot evaluate keeps its results; the command goes on with the others.
     """
-    from service.work.progress import progress  # start-up time: only this command needs it
-    from service.workflows import replay as workflow  # start-up time
+    from service.changes import replay as change  # start-up time
+    from service.jobs.progress import progress  # start-up time: only this command needs it
 
     left = []
     with existing(database) as opened, executor(scheduler) as computing, progress(err, "replaying") as advance:
-        clutch_ids = clutch_ids_given or workflow.clutch_ids(opened)
+        clutch_ids = clutch_ids_given or change.clutch_ids(opened)
         advance(0, total=len(clutch_ids))
-        for replayed in workflow.replay(opened, clutch_ids, computing):
+        for replayed in change.replay(opened, clutch_ids, computing):
             if replayed.error is not None:
                 left.append(replayed.name)
                 say(f"{replayed.name}: not replayed: {replayed.error}")
@@ -112,8 +112,8 @@ def verify(
 
     Prints one line for each fault, and ends with 1 if there is any. Works beside a running service and on a backup.
     """
-    from service.queries import verification  # start-up time
-    from service.work.background import use_one_blas_thread  # start-up time
+    from service.answers import verification  # start-up time
+    from service.jobs.background import use_one_blas_thread  # start-up time
     from storage import clutches  # start-up time
     from storage.engine.integrity import other_schema  # start-up time
 
@@ -165,8 +165,8 @@ def migrate(
     If it was interrupted, repeat the command: it goes on where it stopped. No service uses the target until all tables
     are the same on both sides.
     """
-    from service.queries import verification  # start-up time
-    from service.work.progress import progress  # start-up time
+    from service.answers import verification  # start-up time
+    from service.jobs.progress import progress  # start-up time
     from storage import clutches  # start-up time
     from storage.transfer import transfer  # start-up time
 
@@ -220,7 +220,7 @@ def move(to: Address, database: Database = DATABASE) -> None:
 
     The service may run meanwhile. You may interrupt the command and repeat it. `collect` then removes the old copies.
     """
-    from service.workflows.raw_records import move as move_all  # start-up time
+    from service.changes.raw_records import move as move_all  # start-up time
 
     with existing(database) as opened, Progress(console=err, transient=True) as progress:
         task = progress.add_task("moving channels", total=None)
@@ -238,7 +238,7 @@ def relocate(
 
     If a run arrives meanwhile, the service refuses the run or this command fails: then copy again and repeat.
     """
-    from service.workflows.raw_records import relocate as look_at  # start-up time
+    from service.changes.raw_records import relocate as look_at  # start-up time
 
     with existing(database) as opened:
         count = look_at(opened, address, to)
@@ -255,7 +255,7 @@ def collect(
     ] = 24.0,
 ) -> None:
     """Remove files of raw records that no run uses, as interrupted requests leave them. Safe while services run."""
-    from service.workflows.raw_records import collect as collect_all  # start-up time
+    from service.changes.raw_records import collect as collect_all  # start-up time
 
     with existing(database) as opened:
         for store in collect_all(opened, grace=grace_hours * 3600.0):

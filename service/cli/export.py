@@ -23,7 +23,7 @@ from service.cli.options import ClutchId, asking, err, print_line
 from service.cli.workbook import write_workbook
 from service.client.clutchlife.answers import RefusedError
 from service.client.clutchlife.transport import Service
-from service.run_files import manifest
+from service.runs import manifest
 
 #: The folders of what was sent and does not count so, and of the files that runs were read from.
 AS_SENT, FILES = "as-sent", "files"
@@ -56,7 +56,7 @@ def export(
 
 
 def _export(service: Service, clutch: str, out_folder: Path) -> None:
-    from service.schemas.clutch import ClutchIn  # start-up time
+    from service.api.clutch import ClutchIn  # start-up time
 
     results = out_folder / "results"
     results.mkdir(parents=True, exist_ok=True)
@@ -137,7 +137,7 @@ def _safe(name: str) -> str:
 
 
 def _results(service: Service, clutch: str, folder: Path) -> None:
-    from service.schemas.life import MethodName  # start-up time
+    from service.api.life import MethodName  # start-up time
 
     base = f"/v1/clutches/{clutch}"
     for method in get_args(MethodName):

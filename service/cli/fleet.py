@@ -17,7 +17,7 @@ def show(context: typer.Context, database: Database = DATABASE) -> None:
     """The newest version of every kind's prior."""
     if context.invoked_subcommand is not None:
         return
-    from service.queries.fleet_priors import newest  # start-up time
+    from service.answers.fleet_priors import newest  # start-up time
 
     with existing(database, read_only=True) as opened:
         priors = newest(opened)
@@ -34,9 +34,9 @@ def refresh(
     quiet: Annotated[bool, typer.Option("--quiet", help="Print changes only")] = False,
 ) -> None:
     """Learn every kind's prior again, and update the predictions of clutches whose prior has changed."""
-    from service.queries.fleet_priors import newest  # start-up time
-    from service.work.progress import progress  # start-up time
-    from service.workflows.learn_fleet import refresh as learn_priors  # start-up time
+    from service.answers.fleet_priors import newest  # start-up time
+    from service.changes.learn_fleet import refresh as learn_priors  # start-up time
+    from service.jobs.progress import progress  # start-up time
 
     now = datetime.now(UTC).isoformat(timespec="seconds")
     with existing(database) as opened, executor(scheduler) as computing, progress(err, "learning") as advance:
@@ -74,8 +74,8 @@ def score(
     database: Database = DATABASE,
 ) -> None:
     """Score the prediction at every test of every life that has ended."""
-    from service.lives.tracks import METHODS  # start-up time
-    from service.queries import scores  # start-up time
+    from service.answers import scores  # start-up time
+    from service.clutch.tracking import METHODS  # start-up time
     from storage import clutches  # start-up time
 
     if method not in METHODS:

@@ -22,7 +22,7 @@ from service.errors import NotFoundError
 from storage.engine.errors import StorageError
 
 if TYPE_CHECKING:
-    from service.work.executor import Executor
+    from service.jobs.executor import Executor
     from storage.engine.database import Database as Opened
 
 #: Exit codes of sysexits.h: the input is wrong, the service is away (try again later), the call is wrong.
@@ -112,7 +112,7 @@ def existing(url: str, *, read_only: bool = False) -> Iterator["Opened"]:
 @contextmanager
 def executor(scheduler: str) -> Iterator["Executor"]:
     """The executor of an option, closed at the end; that it cannot be used ends the command with a line."""
-    from service.work import executor as executors  # start-up time: few commands compute
+    from service.jobs import executor as executors  # start-up time: few commands compute
 
     with errors_in_a_line():
         try:

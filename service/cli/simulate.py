@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from service.cli.options import EX_USAGE, Seed, err, errors_in_a_line, fail, out, print_line, spinning
-from service.run_files import manifest
+from service.runs import manifest
 
 if TYPE_CHECKING:
-    from models.rig.programme import Programme
+    from models.rig.programme import RigProgramme
     from models.rig.simulated_runs import SimulatedRun
-    from service.run_files.record_writer import RecordFormat
+    from service.runs.record_writer import RecordFormat
 
 #: The campaign ends at this share of the mean COF when new. Chosen: a little below the end of life at 0.5.
 _STOP = 0.45
@@ -83,7 +83,7 @@ def simulate(
     """
     from models.rig import campaign, hidden, stationary, temperatures, truth  # start-up time
     from models.rig.simulated_runs import RunKind  # start-up time
-    from service.run_files import record_writer, simulated  # start-up time
+    from service.runs import record_writer, simulated  # start-up time
 
     with errors_in_a_line():
         if plan is not None:
@@ -148,7 +148,7 @@ def _run_plan(folder: Path, plan: Path, alternative: int) -> None:
     """One test of a plan on the clutch of a campaign that was simulated into the folder, as its `answer.json` has it."""
     from models.rig import campaign, hidden, stationary, temperatures  # start-up time
     from models.rig.programme import Ageing  # start-up time
-    from service.run_files import simulated  # start-up time
+    from service.runs import simulated  # start-up time
 
     if not (folder / manifest.ANSWER).is_file():
         fail(f"{folder} holds no simulated campaign: give the folder in which you simulated the clutch", EX_USAGE)
@@ -179,17 +179,17 @@ def _run_plan(folder: Path, plan: Path, alternative: int) -> None:
 
 def _programme(
     raw_rate: float | None, dynamic: bool, ageing: str, frequencies: list[float], pressures: list[float]
-) -> "Programme":
+) -> "RigProgramme":
     """The programme of fig. 2 with these options; frequencies in Hz and pressures in bar, the reference's without any."""
-    from models.rig.programme import Ageing, Programme  # start-up time
+    from models.rig.programme import Ageing, RigProgramme  # start-up time
     from models.rig.sampled import PROTOCOL, DynamicTest, RawTest  # start-up time
-    from service.columns import PASCALS_PER_BAR  # start-up time
+    from service.channels import PASCALS_PER_BAR  # start-up time
 
     levels = tuple(PASCALS_PER_BAR * level for level in sorted(set(pressures))) or PROTOCOL
     usual = DynamicTest(pressures=levels)
     swings = [replace(usual, frequency=f, duration=max(usual.duration, 1.5 / f)) for f in dict.fromkeys(frequencies)]
     loops = (swings or [usual]) if dynamic else []
-    return Programme(
+    return RigProgramme(
         dynamic=loops[0] if loops else None,
         further=tuple(loops[1:]),
         raw=None if raw_rate is None else RawTest(rate=raw_rate, pressures=levels),
@@ -216,7 +216,7 @@ def _sizes(hide: list[str]) -> dict[str, float]:
 
 def _write(folder: Path, run: "SimulatedRun", record_format: "RecordFormat") -> list[dict[str, Any]]:
     """One run into one file; its entry for the manifest, where it is not JSON."""
-    from service.run_files import record_writer, simulated  # start-up time
+    from service.runs import record_writer, simulated  # start-up time
 
     if record_format is record_writer.RecordFormat.JSON or run.duty is not None:
         manifest.write(folder / f"{run.run_id}.json", simulated.simulated_body(run))

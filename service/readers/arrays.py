@@ -18,7 +18,7 @@ from service.errors import InvalidError, Notice
 from service.readers.column_names import column_of, known_channel, recognised
 from service.readers.limits import Limits
 from service.readers.stated_clocks import UNITS, stated_clock
-from service.readers.table import Column, Reading, Table, index_of_wanted
+from service.readers.table import FileColumn, Reading, Table, index_of_wanted
 from service.readers.unit_table import is_unit
 
 _DATA = ("data", "values", "value", "y", "samples")
@@ -50,7 +50,7 @@ class Leaf:
 class _Source:
     """A column and how its values are read."""
 
-    column: Column
+    column: FileColumn
     leaf: Leaf
     index: Any
 
@@ -158,7 +158,7 @@ def _columns(name: str, leaf: Leaf, group: str, beside: Tree) -> Iterator[_Sourc
         stated_as = [title, f"field_{at}"] if dtype.names else [title]
         unit = units[at] or _unit(stated_as, leaf.attributes, beside, whole=size == 1 and not dtype.names)
         if matrix and not names:
-            column = Column(part, None, group, part)
+            column = FileColumn(part, None, group, part)
         else:
             column = column_of(title, unit or None, group, moments=dtype.kind in "Mm")
         yield _Source(replace(column, rows=rows, clock=clock), leaf, place)

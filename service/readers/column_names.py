@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 from enum import Enum
 from functools import lru_cache
 
-from service.columns import CHANNELS
+from service.channels import CHANNELS
 from service.errors import MAX_QUOTED, FieldError, InvalidError
 from service.readers.limits import LONGEST_MAP, LONGEST_NAME, LONGEST_TITLE, LONGEST_UNIT
-from service.readers.table import NO_TIME, Choice, Column, Reading
+from service.readers.table import NO_TIME, ColumnChoice, FileColumn, Reading
 from service.readers.unit_table import Conversion, conversion, is_unit, spellings
 
 #: Single letters have their meaning in mechanics: capitals count (M is a torque, n a speed, p a pressure, t a time).
@@ -210,23 +210,23 @@ def _is_another(name: str) -> bool:
     return any(map(_OTHER.match, _words(name[:LONGEST_NAME])))
 
 
-def is_time(column: Column) -> bool:
+def is_time(column: FileColumn) -> bool:
     """Whether a column is a time by its name, or may be one by its unit."""
     return meaning(column.name, column.unit)[0] == "time_s" or _may_be_time(column)
 
 
-def part_of_second(column: Column) -> float | None:
+def part_of_second(column: FileColumn) -> float | None:
     """The factor to s of a column beside the time that may hold the part of the second: its title is a unit, or says so."""
     unit = conversion("time_s", column.unit or column.name)
     return unit.factor if unit and unit.factor < 1 else 1.0 if _PART_OF_SECOND.search(column.name) else None
 
 
-def is_counter(column: Column) -> bool:
+def is_counter(column: FileColumn) -> bool:
     """Whether a time column's title is LabVIEW's, which may count samples."""
     return _key(column.name) == "x_value"
 
 
-def column_of(text: str, unit: str | None = None, group: str = "", *, moments: bool = False) -> Column:
+def column_of(text: str, unit: str | None = None, group: str = "", *, moments: bool = False) -> FileColumn:
     """A column's title -> name and unit: `torque [Nm]`, `torque (Nm)`, `M / Nm`, `Druck in bar`, `Time, ms`, `speed_rad_s`.
 
     `unit` is what the file states beside the title; points in time (`moments`) need none. Raises InvalidError on a text
@@ -240,7 +240,7 @@ def column_of(text: str, unit: str | None = None, group: str = "", *, moments: b
         )
         raise InvalidError.of(message, code="title_too_long", value=shown)
     name, title_unit = _taken_apart(" ".join(title.translate(_WIDE).split()))
-    column = Column(name, "s" if moments else title_unit, group, title)
+    column = FileColumn(name, "s" if moments else title_unit, group, title)
     return column if unit is None or moments else with_unit(column, unit)
 
 
@@ -276,7 +276,7 @@ def bare_unit(text: str) -> str | None:
     return unit if re.search(r"[^-_=?.*/|\s]", unit) else None
 
 
-def with_unit(column: Column, unit: str | None) -> Column:
+def with_unit(column: FileColumn, unit: str | None) -> FileColumn:
     """A column with the unit that the file states beside the name; raises InvalidError where the name states another."""
     stated = bare_unit(unit or "")
     if stated and column.unit and is_unit(stated) and not is_unit(column.unit):
@@ -290,7 +290,7 @@ def with_unit(column: Column, unit: str | None) -> Column:
     return replace(column, unit=stated or column.unit)
 
 
-def parse_map(mapping: str | None) -> dict[str, Choice]:
+def parse_map(mapping: str | None) -> dict[str, ColumnChoice]:
     """`torque_nm:Mz,pressure_bar:p1` -> {channel: its column}. Names may hold commas and colons themselves.
 
     Raises InvalidError where the text is no such list, or a channel in it is unknown or named twice.
@@ -299,7 +299,7 @@ def parse_map(mapping: str | None) -> dict[str, Choice]:
         return {}
     if len(mapping) > LONGEST_MAP:
         raise _wrong_map(mapping, f"must not be longer than {LONGEST_MAP} characters")
-    choices: dict[str, Choice] = {}
+    choices: dict[str, ColumnChoice] = {}
     for part in re.split(rf",(?=\s*(?:{'|'.join(CHANNELS)})\s*:)", mapping):
         channel, colon, name = part.partition(":")
         channel, name = channel.strip(), name.strip()
@@ -309,7 +309,7 @@ def parse_map(mapping: str | None) -> dict[str, Choice]:
             raise _wrong_map(channel, f"must name channels from {', '.join(CHANNELS)}")
         if channel in choices:
             raise _wrong_map(channel, "must name each channel once")
-        choices[channel] = Choice(column=name)
+        choices[channel] = ColumnChoice(column=name)
     return choices
 
 
@@ -318,11 +318,11 @@ def _wrong_map(value: str, rule: str) -> InvalidError:
     return InvalidError.of(message, code="invalid_map", pointer="/map", value=value)
 
 
-def choices_of(reading: Reading) -> dict[str, Choice]:
+def choices_of(reading: Reading) -> dict[str, ColumnChoice]:
     """The columns that a caller names, the time column among them."""
     named = dict(reading.mapping)
     if reading.time and reading.time != NO_TIME:
-        named.setdefault("time_s", Choice(column=reading.time))
+        named.setdefault("time_s", ColumnChoice(column=reading.time))
     return named
 
 
@@ -344,7 +344,7 @@ def recognised(titles: Sequence[str], named: Sequence[str]) -> int:
     return len(channels)
 
 
-def choose(columns: Sequence[Column], reading: Reading) -> list[Taken]:
+def choose(columns: Sequence[FileColumn], reading: Reading) -> list[Taken]:
     """Which columns are taken, in the order of the file; all others are left out. The time may be taken several times.
 
     Raises InvalidError where two columns are the same channel, or a unit is unknown or not stated.
@@ -359,7 +359,7 @@ def choose(columns: Sequence[Column], reading: Reading) -> list[Taken]:
     return chosen
 
 
-def understood(columns: Sequence[Column], reading: Reading) -> tuple[list[Taken], list[InvalidError]]:
+def understood(columns: Sequence[FileColumn], reading: Reading) -> tuple[list[Taken], list[InvalidError]]:
     """The columns that are channels, in the order of the file, and what keeps them from being read."""
     named, errors = choices_of(reading), []
     if reading.time == NO_TIME:
@@ -398,7 +398,7 @@ def understood(columns: Sequence[Column], reading: Reading) -> tuple[list[Taken]
     if not {*chosen} - guessed:
         return [], errors
     columns_taken: list[Taken] = []
-    unstated: list[tuple[str, Column]] = []
+    unstated: list[tuple[str, FileColumn]] = []
     for index, channel in sorted(chosen.items()):
         asked_column = named.get(channel) if index in by_map else None
         public = _key(columns[index].name) == channel
@@ -418,12 +418,12 @@ def understood(columns: Sequence[Column], reading: Reading) -> tuple[list[Taken]
     return columns_taken, errors
 
 
-def _may_be_time(column: Column) -> bool:
+def _may_be_time(column: FileColumn) -> bool:
     """Whether a column that is in a unit of time may be the clock, if its values run on as one."""
     return meaning(column.name, column.unit)[1] is Sense.UNKNOWN and _measures("time_s", column.unit)
 
 
-def no_unit(columns: Sequence[tuple[str, Column]], reading: Reading) -> InvalidError:
+def no_unit(columns: Sequence[tuple[str, FileColumn]], reading: Reading) -> InvalidError:
     """The error of columns that state no unit. It ends with the `map=` to add if all of them are in their channels' own
     units."""
     errors = []
@@ -440,7 +440,7 @@ def no_unit(columns: Sequence[tuple[str, Column]], reading: Reading) -> InvalidE
     )
 
 
-def _find(columns: Sequence[Column], channel: str, name: str) -> int:
+def _find(columns: Sequence[FileColumn], channel: str, name: str) -> int:
     """The index of the column that a map names: by its exact title or name, else whatever its case, blanks and unit."""
     key, forms = _key(column_of(name).name), [(own.title, own.name, f"{own.group}/{own.name}") for own in columns]
     exact = [index for index, names in enumerate(forms) if name in names]
@@ -454,7 +454,7 @@ def _find(columns: Sequence[Column], channel: str, name: str) -> int:
     raise InvalidError.of(message, code="no_such_column", pointer="/map", value=name)
 
 
-def _twice(channel: str, *columns: Column) -> InvalidError:
+def _twice(channel: str, *columns: FileColumn) -> InvalidError:
     names = [column.shown() for column in columns]
     if len(set(names)) < len(names):
         names = [column.title[:MAX_QUOTED] or column.shown() for column in columns]
@@ -473,7 +473,7 @@ def several_times(shown: str) -> InvalidError:
     return InvalidError.of(message, code="ambiguous", pointer="/time")
 
 
-def _list(columns: Sequence[Column]) -> str:
+def _list(columns: Sequence[FileColumn]) -> str:
     shown = ", ".join(repr(column.shown()) for column in columns[:_MAX_NAMED])
     return shown if len(columns) <= _MAX_NAMED else f"{shown} and {len(columns) - _MAX_NAMED} more"
 
@@ -496,7 +496,7 @@ def _may_state(channel: str, title: str) -> str | None:
     return None
 
 
-def _unit(channel: str, column: Column, choice: Choice | None) -> str | None:
+def _unit(channel: str, column: FileColumn, choice: ColumnChoice | None) -> str | None:
     """The unit that the file, the map or the profile states; None where none does.
 
     A column that a map names may end in its unit, whatever parts them. Where a title says that its values are scaled, only
@@ -529,7 +529,7 @@ def _unit(channel: str, column: Column, choice: Choice | None) -> str | None:
     return unit
 
 
-def _conversion(channel: str, column: Column, choice: Choice | None, unit: str | None) -> Conversion:
+def _conversion(channel: str, column: FileColumn, choice: ColumnChoice | None, unit: str | None) -> Conversion:
     """The conversion to the channel's unit. A public name states its unit: another unit beside it is a contradiction.
 
     A column that a map names without a unit is in the channel's unit.
@@ -548,7 +548,7 @@ def _conversion(channel: str, column: Column, choice: Choice | None, unit: str |
     return converted
 
 
-def _wrong_unit(channel: str, column: Column, code: str, rule: str, got: str) -> InvalidError:
+def _wrong_unit(channel: str, column: FileColumn, code: str, rule: str, got: str) -> InvalidError:
     shown = channel if _key(column.name) == channel else f"{channel} (column {column.shown()!r})"
     message = f"{shown}: the unit {rule}, got {got}"
     return InvalidError.of(message, code=code, pointer=f"/channels/{channel}", value=(column.unit or ""))

@@ -23,10 +23,10 @@ from service.readers.column_names import (
     recognised,
     several_times,
 )
-from service.readers.grid import is_value
 from service.readers.limits import LIMITS
 from service.readers.numerals import plain, read_cells
-from service.readers.table import NO_TIME, Clock, Column, Reading, Table
+from service.readers.table import NO_TIME, Clock, FileColumn, Reading, Table
+from service.readers.table_finder import is_value
 from service.readers.unit_table import is_unit
 
 #: Rows of a table without lines by which its columns are judged, as many as others show.
@@ -43,12 +43,12 @@ _ON, _OFF = {"true", "1", "1.0"}, {"false", "0", "0.0"}
 _SECOND = np.timedelta64(1, "s")
 
 
-def says_valid(column: Column) -> bool:
+def says_valid(column: FileColumn) -> bool:
     """Whether a column says which rows are valid, by its title."""
     return _QUALITY.search(column.name) is not None or _STATUS.search(column.name) is not None
 
 
-def valid_rows(column: Column, cells: NDArray[Any]) -> NDArray[np.bool_] | None:
+def valid_rows(column: FileColumn, cells: NDArray[Any]) -> NDArray[np.bool_] | None:
     """Which rows a column says to be valid [n]; None where it does not say so in words or flags that are known."""
     words = np.array([word.casefold() for word in _stripped(cells)], dtype=object)
     flags = _ON | _OFF if _QUALITY.search(column.name) else set()
@@ -125,7 +125,7 @@ def _distinct(cells: Sequence[Any]) -> list[str]:
     return list(dict.fromkeys(map(str, cells)))
 
 
-def _time(columns: Sequence[Column], reading: Reading) -> tuple[int, Any] | None:
+def _time(columns: Sequence[FileColumn], reading: Reading) -> tuple[int, Any] | None:
     """The column of times and its conversion to s."""
     if reading.time == NO_TIME:
         return None
@@ -141,7 +141,7 @@ def _time(columns: Sequence[Column], reading: Reading) -> tuple[int, Any] | None
     return places[chosen.index], chosen.conversion
 
 
-def _value(columns: Sequence[Column], numeric: Sequence[int], names: int, reading: Reading) -> int:
+def _value(columns: Sequence[FileColumn], numeric: Sequence[int], names: int, reading: Reading) -> int:
     """The column of values: the only one of numbers that is no time, or the one that is called so."""
     timed = choices_of(reading).get("time_s")
     candidates = [index for index in numeric if not is_time(columns[index])]
@@ -168,7 +168,7 @@ def _seconds(times: NDArray[Any], conversion: Any) -> NDArray[np.float64]:
     return seconds
 
 
-def _column(name: str, units: set[str], rows: NDArray[np.intp], times: NDArray[np.float64] | None) -> Column:
+def _column(name: str, units: set[str], rows: NDArray[np.intp], times: NDArray[np.float64] | None) -> FileColumn:
     if len(units) > 1:
         both = " and ".join(sorted(units))[:MAX_QUOTED]
         message = f"channel {name[:MAX_QUOTED]!r} must be in one unit, got {both}"

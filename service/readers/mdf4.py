@@ -20,7 +20,7 @@ from service.errors import MAX_QUOTED, InvalidError, Notice
 from service.readers.column_names import choices_of, column_of
 from service.readers.limits import Limits
 from service.readers.stated_clocks import in_seconds
-from service.readers.table import Clock, Column, Reading, Table, cut_short
+from service.readers.table import Clock, FileColumn, Reading, Table, cut_short
 
 #: Conversions that refer to each other, at most. Chosen: recorders refer once.
 _DEEPEST_CONVERSION = 8
@@ -67,7 +67,7 @@ def _name(file: Any, group: int) -> str:
     return str(file.groups[group].channel_group.acq_name or f"group {group}")
 
 
-def _column(file: Any, group: int, index: int, several: bool) -> Column:
+def _column(file: Any, group: int, index: int, several: bool) -> FileColumn:
     rows = int(file.groups[group].channel_group.cycles_nr)
     name = _name(file, group) if several else ""
     unit = file.get_channel_unit(group=group, index=index)

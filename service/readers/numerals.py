@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
-from service.columns import LineOf, place
+from service.channels import LineOf, place
 from service.errors import MAX_ERRORS, MAX_QUOTED, FieldError, InvalidError
 from service.readers.table import Reading, Table, marks
 from service.readers.unit_table import is_unit

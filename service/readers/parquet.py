@@ -19,7 +19,7 @@ from service.readers.arrays import parsed, refuse_counts, stated_unit, unit_of_a
 from service.readers.column_names import column_of, known_channel
 from service.readers.limits import Limits
 from service.readers.numerals import is_stamp
-from service.readers.table import Column, Reading, Table
+from service.readers.table import FileColumn, Reading, Table
 
 
 def read_table(path: Path, _: Reading, limits: Limits) -> Table:
@@ -52,7 +52,7 @@ def _stated(metadata: Mapping[bytes, bytes] | None) -> dict[str, Any]:
     return stated
 
 
-def _column(field: Any, file: Any, beside: Mapping[str, Any]) -> Column:
+def _column(field: Any, file: Any, beside: Mapping[str, Any]) -> FileColumn:
     moment = kinds.is_temporal(field.type)
     if known_channel(field.name) == "time_s" and kinds.is_large_string(field.type) | kinds.is_string(field.type):
         moment = any(is_stamp(str(batch[0][0])) for batch in islice(file.iter_batches(1, columns=[field.name]), 1))

@@ -11,7 +11,7 @@ from typing import Any
 
 from service.errors import InvalidError
 from service.readers import sandbox
-from service.readers.channels import Channels, to_channels
+from service.readers.assemble import Channels, to_channels
 from service.readers.column_names import parse_map
 from service.readers.detect import Format, members, opened, sniff, unpacked
 from service.readers.limits import LIMITS, Limits

@@ -24,14 +24,14 @@ from typing import Any, BinaryIO, Literal
 
 import numpy as np
 
-from service.columns import CHANNELS
+from service.channels import CHANNELS
 from service.errors import BusyError, FieldError, InvalidError, Notice, ServiceError, TooLargeError, exit_text
-from service.readers.channels import Channels, to_channels
+from service.readers.assemble import Channels, to_channels
 from service.readers.confinement import close_files, close_network_and_processes
 from service.readers.detect import Format, is_packed, opened, overdue, too_slow
 from service.readers.limits import Limits
 from service.readers.preview import preview
-from service.readers.table import Choice, Reading
+from service.readers.table import ColumnChoice, Reading
 
 #: The module that reads each format, the package it needs, and the extra of ours that installs it ("": always there).
 READERS = {
@@ -191,7 +191,7 @@ def main() -> None:
     """Read the file that standard input names; write the answer to the open file whose number is the first argument."""
     request = json.load(sys.stdin)
     kind, path, limits = Format(request["kind"]), Path(request["path"]), Limits(**request["limits"])
-    mapping = {name: Choice(**choice) for name, choice in request["reading"]["mapping"].items()}
+    mapping = {name: ColumnChoice(**choice) for name, choice in request["reading"]["mapping"].items()}
     reading = Reading(**request["reading"] | {"mapping": mapping})
     with os.fdopen(int(sys.argv[1]), "wb") as result:
         # whatever it loads, and asks of the system, before the doors close

@@ -11,7 +11,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
-from service.columns import LineOf
+from service.channels import LineOf
 from service.errors import MAX_QUOTED, InvalidError, Notice
 
 #: The time option that takes no clock: each row is a plateau.
@@ -21,7 +21,7 @@ NO_MISSING = "none"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Choice:
+class ColumnChoice:
     """The column of a channel: its title, and its unit; value = factor · converted + offset, in the channel's unit.
 
     `unit` takes the place of what the file states, which must be that unit or `stated`; None: the file's own.
@@ -44,7 +44,7 @@ class Reading:
     value are left out; NO_MISSING: every number is a measurement.
     """
 
-    mapping: Mapping[str, Choice] = field(default_factory=dict)
+    mapping: Mapping[str, ColumnChoice] = field(default_factory=dict)
     only_named: bool = False
     table: str = ""
     time: str = ""
@@ -66,7 +66,7 @@ class Clock:
 
 
 @dataclass(frozen=True, slots=True)
-class Column:
+class FileColumn:
     """One column of a file: its name without a unit, and the unit that the file states (None: it states none).
 
     `group` distinguishes equal names in files that have groups; a map may use `group/name`. `title` is the text of the
@@ -97,7 +97,7 @@ class Table:
     `head`: its first rows as text. Of several tables below each other, with the same titles, `breaks` has the first row of
     each but one. `line_of`, `breaks` and `notices` hold once the values are read."""
 
-    columns: tuple[Column, ...]
+    columns: tuple[FileColumn, ...]
     read: Values
     name: str = ""
     others: tuple[str, ...] = ()

@@ -20,7 +20,7 @@ from service.readers.column_names import column_of
 from service.readers.limits import Limits
 from service.readers.numerals import is_stamp
 from service.readers.stated_clocks import evenly, in_seconds, stated_clock
-from service.readers.table import Clock, Column, Reading, Table, cut_short
+from service.readers.table import Clock, FileColumn, Reading, Table, cut_short
 from service.readers.unit_table import conversion
 
 #: Kinds of scales that npTDMS computes.
@@ -91,7 +91,7 @@ def _stated(properties: Mapping[str, Any]) -> dict[str, float | str]:
     }
 
 
-def _column(channel: Any, grouped: bool, clock: Clock | None) -> Column:
+def _column(channel: Any, grouped: bool, clock: Clock | None) -> FileColumn:
     kind = "" if channel.dtype is None else channel.dtype.kind
     moments = kind == "M" or (kind in "OSU" and is_stamp(str(channel[0])))
     group = channel.group_name if grouped else ""

@@ -23,10 +23,10 @@ from models.arrays import FloatArray
 from service.errors import MAX_ERRORS, MAX_QUOTED, FieldError, InvalidError, TooLargeError
 from service.readers.column_names import named_columns, recognised
 from service.readers.detect import ByteSource, Format, overdue, too_slow
-from service.readers.grid import MAX_ROWS, TURNED, DataRows, Layout, find_table, no_table, table_in, turned
 from service.readers.limits import LIMITS, LONGEST_LINE_BYTES, Limits
 from service.readers.numerals import Numerals, is_stamp
 from service.readers.table import Reading, Table
+from service.readers.table_finder import MAX_ROWS, TURNED, DataRows, Layout, find_table, no_table, table_in, turned
 
 #: Bytes of a block; the first must hold the titles. Chosen: rows that are no plain numbers take 60 times as much memory.
 _BLOCK = 1 << 17
@@ -85,7 +85,7 @@ def read_text(opened: Open, reading: Reading, limits: Limits) -> Table:
             raise TooLargeError(message) from None
         table = read_text(lambda: nullcontext(io.BytesIO(on_its_side)), reading, limits)
         return replace(table, notices=[*table.notices, TURNED])
-    body = _Body(opened, form, reading, limits)
+    body = _DataBody(opened, form, reading, limits)
     return table_in(
         body.data, first_line=form.first_line, read=body.read, rows_read=lambda: body.rows, line_of=body.line_of
     )
@@ -256,7 +256,7 @@ def wrong_line(line: int, rule: str, code: str, got: str = "") -> InvalidError:
 # --- the rows of data ---
 
 
-class _Body:
+class _DataBody:
     """The rows of data, block by block: columns of text into columns of numbers."""
 
     def __init__(self, opened: Open, form: _Form, reading: Reading, limits: Limits) -> None:

@@ -16,9 +16,9 @@ from python_calamine import CalamineWorkbook, SheetTypeEnum, SheetVisibleEnum
 from service.errors import InvalidError
 from service.readers.column_names import named_columns, recognised
 from service.readers.detect import check_archive
-from service.readers.grid import MAX_ROWS, TURNED, DataRows, Layout, find_table, no_table, table_in, turned
 from service.readers.limits import Limits
 from service.readers.table import Reading, Table, index_of_wanted
+from service.readers.table_finder import MAX_ROWS, TURNED, DataRows, Layout, find_table, no_table, table_in, turned
 
 
 def read_table(path: Path, reading: Reading, limits: Limits) -> Table:

@@ -17,8 +17,8 @@ from typing import Annotated, Any, Literal, get_args
 
 from fastapi import Depends, Request
 
+from service.api.base import LONGEST_IDENTIFIER
 from service.errors import FieldError, ForbiddenError, InvalidError, UnauthorizedError
-from service.schemas.base import LONGEST_IDENTIFIER
 from service.web.context import Context
 from storage.engine.database import GrantedKey, Question, Snapshot
 from storage.keys import KeyRow

@@ -16,7 +16,7 @@ from pydantic import BaseModel
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.errors import BusyError, TooLargeError, TooSlowError
-from service.run_files.json_run import checked
+from service.runs.json_run import checked
 from service.web import limits
 
 Endpoint = TypeVar("Endpoint", bound=Callable[..., Any])
@@ -117,7 +117,7 @@ class Bodies:
         if scope["type"] != "http":
             await self.app(scope, receive, send)
             return
-        body = _Body(self.rooms)
+        body = _RequestBody(self.rooms)
         begun: float | None = None
         whole = False
         clock = asyncio.get_running_loop().time
@@ -158,7 +158,7 @@ class Bodies:
             body.leave()
 
 
-class _Body:
+class _RequestBody:
     """The body of a request as far as it has arrived, and what it takes of the rooms by place."""
 
     def __init__(self, rooms: Mapping[str, Room]) -> None:

@@ -13,16 +13,16 @@ from fastapi.concurrency import run_in_threadpool
 
 from models.prognosis.criteria import HORIZON
 from service.alarms.outbox import Outbox
-from service.lists import ALL_ITEMS, LONGEST_CURSOR
-from service.queries.cache import AnswerCache, Revalidation
-from service.schemas.parameters import SHORT
+from service.answers.cache import AnswerCache, Revalidation
+from service.api.parameters import SHORT
+from service.jobs.queue import JobQueue
+from service.jobs.workers import Workers
+from service.paging import ALL_ITEMS, LONGEST_CURSOR
 from service.settings import Settings
 from service.web.files import Copies
 from service.web.limits import MAX_HORIZONS, MAX_ITEMS, MAX_PRESSURE_BAR, USE_NOTED_SECONDS
 from service.web.metrics import Metrics
 from service.web.readiness import Readiness
-from service.work.queue import JobQueue
-from service.work.workers import Workers
 from storage import keys
 from storage.engine.database import Database
 from storage.engine.errors import StorageError

@@ -21,9 +21,9 @@ from fastapi.responses import Response, StreamingResponse
 from starlette.datastructures import UploadFile
 from starlette.types import Receive, Scope, Send
 
+from service.api.rig import RigProfile
 from service.errors import BusyError, InvalidError
-from service.run_files.rig_profile import require_usable
-from service.schemas.rig import RigProfile
+from service.runs.rig_profile import require_usable
 from service.web.bodies import Room, parsed
 from service.web.limits import COPIES_SHARE, MAX_BYTES_IN_MEMORY, PIECE_BYTES
 

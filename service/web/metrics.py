@@ -14,9 +14,9 @@ from prometheus_client.core import GaugeMetricFamily, Metric
 from prometheus_client.multiprocess import MultiProcessCollector, mark_process_dead
 from prometheus_client.registry import Collector
 
-from service.queries import clutch_list
+from service.answers import clutch_list
+from service.jobs.workers import Lane
 from service.web.limits import METRICS_PAGE
-from service.work.workers import Lane
 from storage import assumptions, clutches, jobs, runs
 from storage.engine.database import Database
 

@@ -1,7 +1,7 @@
 """The API's description: what FastAPI makes of the routes, completed by what holds for all of them.
 
 Keys, entity tags and 304, the headers of pages and refusals, compression, and an example of every field and parameter
-(`service.schemas.examples`). The schemas of bodies and problems, which routes describe by themselves, are named as all are.
+(`service.api.examples`). The schemas of bodies and problems, which routes describe by themselves, are named as all are.
 """
 
 import json
@@ -10,7 +10,7 @@ from typing import Any
 
 from fastapi import FastAPI
 
-from service.schemas.examples import example_of
+from service.api.examples import example_of
 from service.web.limits import UNLIMITED
 
 Json = dict[str, Any]

@@ -10,6 +10,8 @@ from fastapi.exceptions import RequestValidationError
 from fastapi.responses import Response
 from starlette.exceptions import HTTPException
 
+from service.answers.cache import to_json
+from service.api.base import Problem, rule_in_words
 from service.errors import (
     ConflictError,
     DamagedError,
@@ -27,8 +29,6 @@ from service.errors import (
     UnsupportedMediaTypeError,
 )
 from service.logging import request_id
-from service.queries.cache import to_json
-from service.schemas.base import Problem, rule_in_words
 from service.web.auth import route_of
 from service.web.limits import RETRY_AFTER_SECONDS
 from storage.engine.errors import DamagedData, DatabaseBusy, RawStoreUnavailable, StorageError, UnstorableText

@@ -9,9 +9,9 @@ import time
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 
+from service.jobs.queue import JobQueue
+from service.jobs.workers import Workers
 from service.web.limits import LONGEST_LOOK_SECONDS, LONGEST_RAW_LOOK_SECONDS, RAW_LOOK_SECONDS
-from service.work.queue import JobQueue
-from service.work.workers import Workers
 from storage.blobs import raw_stores
 from storage.blobs.stores import open_store
 from storage.engine.database import Database

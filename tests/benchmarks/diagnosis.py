@@ -10,9 +10,9 @@ import numpy as np
 
 from models.diagnosis.diagnose import diagnose
 from models.rig import campaign
-from models.rig.programme import QUICK, WHOLE, Programme
+from models.rig.programme import QUICK, WHOLE, RigProgramme
 from models.rig.temperatures import warmed
-from service.run_files.simulated import simulated_body
+from service.runs.simulated import simulated_body
 from tests.blind.rig import sent
 from tests.blind.rig.hide import hide
 from tests.blind.test_blind import FAMILIES
@@ -22,7 +22,7 @@ from tests.support import served
 SEED = 10
 
 
-def post_life(http: httpx2.Client, clutch_id: str, states: int, programme: Programme) -> None:
+def post_life(http: httpx2.Client, clutch_id: str, states: int, programme: RigProgramme) -> None:
     """A simulated life of so many states, an effect of oil temperature in its stationary tests."""
     clutch = campaign.simulated_clutch(1)
     http.post("/v1/clutches", json={"clutch_id": clutch_id})

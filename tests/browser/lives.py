@@ -9,7 +9,7 @@ import httpx2
 import numpy as np
 
 from service.cli.demo import life as demo_life
-from service.run_files import simulated
+from service.runs import simulated
 from tests.support import stationary, torque_nm
 
 JSON = {"Content-Type": "application/json"}

@@ -9,7 +9,7 @@ import numpy as np
 from models.arrays import FloatArray
 from models.friction.stribeck import torque
 from models.loops.lag_laws import attractor_torque, squeeze_film_torque
-from models.loops.loops import Loop, evaluate_loops
+from models.loops.loops import FrictionLoop, evaluate_loops
 from models.rig.sampled import DynamicTest, sampled_test
 from models.rig.stationary import Sensor
 from models.rig.truth import SimulatedClutch
@@ -68,16 +68,16 @@ def life() -> str:
     return chart.drawn()
 
 
-def _loops(clutch: SimulatedClutch, cycles: int) -> list[Loop]:
+def _loops(clutch: SimulatedClutch, cycles: int) -> list[FrictionLoop]:
     record = sampled_test(clutch, cycles, DynamicTest(), np.random.default_rng([SEED, cycles]), Sensor())
     return [loop for loop in evaluate_loops(record, clutch.geometry, None) if loop.area is not None]
 
 
-def _at(loops: list[Loop], bar: float) -> Loop:
+def _at(loops: list[FrictionLoop], bar: float) -> FrictionLoop:
     return min(loops, key=lambda loop: abs(loop.pressure - 1e5 * bar))
 
 
-def _areas(loops: list[Loop]) -> FloatArray:
+def _areas(loops: list[FrictionLoop]) -> FloatArray:
     """Areas and their deviations [2, n]."""
     return np.array([(loop.area, loop.area_sd) for loop in loops], dtype=np.float64).T
 

@@ -15,8 +15,8 @@ import httpx2
 import numpy as np
 import pytest
 
+from tests.service.changes import stand_in_engine
 from tests.service.web.routes.surfaces import FRESH, WORN, png
-from tests.service.workflows import stand_in_engine
 from tests.storage.engine.postgresql.server import PostgresServer
 from tests.storage.test_transfer import digests
 from tests.support import PRESSURES_BAR, Server, clutchlife, serving, stationary

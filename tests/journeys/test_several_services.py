@@ -15,8 +15,8 @@ import httpx2
 import pytest
 
 from tests.benchmarks.memory import family, resident
-from tests.service.work.waiting import until
-from tests.service.workflows import stand_in_engine
+from tests.service.changes import stand_in_engine
+from tests.service.jobs.waiting import until
 from tests.storage.engine.postgresql.server import PostgresServer
 from tests.support import ONCE, Server, clutchlife, free_port, serving, stationary, wait_until_ready
 

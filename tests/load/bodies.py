@@ -15,8 +15,8 @@ from models.rig.sampled import DynamicTest, RawTest, sampled_test
 from models.rig.simulated_runs import RunKind, SimulatedRun
 from models.rig.stationary import PLATEAU_DURATION, Sensor
 from models.rig.truth import SimulatedClutch
-from service.run_files.record_writer import RecordFormat, write_record
-from service.run_files.simulated import simulated_body, simulated_channels, simulated_clutch_body, simulated_head
+from service.runs.record_writer import RecordFormat, write_record
+from service.runs.simulated import simulated_body, simulated_channels, simulated_clutch_body, simulated_head
 from tests.service.readers.sample_files import write_parquet
 
 #: Stationary tests in a life. In the variant with sampled records every tenth has a dynamic test after it, and every fifth

@@ -9,7 +9,7 @@ import numpy as np
 
 from models.arrays import FloatArray
 from models.plausibility import course, criteria, judgement, pace, slips
-from service.lives.plausibility import doubts, reading
+from service.clutch.plausibility import doubts, reading
 
 Patches = tuple[tuple[object, str, Any], ...]
 #: A probability of nothing.

@@ -8,15 +8,15 @@ from typing import Any
 
 import numpy as np
 
+from service.api.clutch import ClutchIn
+from service.changes import ingest_run
+from service.clutch.analysis import Analysis, analyse, mean_cofs
+from service.clutch.incoming_run import IncomingRun
+from service.clutch.plausibility import doubts
+from service.clutch.recomputation import Arrival
+from service.clutch.timeline import Event, Life, life_with, lives_of, order, reference_velocities
 from service.errors import InvalidError
-from service.lives.history import Event, Life, life_with, lives_of, order, reference_velocities
-from service.lives.incoming_run import IncomingRun
-from service.lives.plausibility import doubts
-from service.lives.recomputation import Arrival
-from service.lives.run_analysis import Analysis, analyse, mean_cofs
-from service.run_files.json_run import read_run
-from service.schemas.clutch import ClutchIn
-from service.workflows import ingest_run
+from service.runs.json_run import read_run
 from tests.plausibility.ablation import WITHOUT, without
 
 Body = dict[str, Any]

@@ -6,12 +6,12 @@ from datetime import UTC, datetime, timedelta
 import numpy as np
 
 from models.rig.campaign import simulate, simulated_clutch
-from models.rig.programme import Programme
+from models.rig.programme import RigProgramme
 from models.rig.sampled import DynamicTest, RawTest
 from models.rig.simulated_runs import DutyBlock, RunKind, SimulatedRun
 from models.rig.stationary import Sensor, stationary_test
 from models.rig.truth import SimulatedClutch
-from service.run_files.simulated import simulated_body
+from service.runs.simulated import simulated_body
 from tests.plausibility.bench import Body, with_gain
 
 BEGUN = datetime(2026, 1, 5, 8, tzinfo=UTC)
@@ -54,7 +54,7 @@ def campaign(rng: np.random.Generator, *, style: str | None = None, dynamic: boo
     with_dynamic = bool(rng.random() < 0.3) if dynamic is None else dynamic
     raw = style == "rig" and not with_dynamic and rng.random() < 0.1
     if style == "rig":
-        programme = Programme(
+        programme = RigProgramme(
             dynamic=DynamicTest(rate=20.0) if with_dynamic else None,
             raw=RawTest(rate=10.0) if raw else None,
             engagements=bool(rng.random() < 0.3),

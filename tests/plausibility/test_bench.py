@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from service import records
-from service.run_files.json_run import read_run
-from service.schemas.clutch import ClutchIn
-from service.workflows.edit_clutch import register
-from service.workflows.ingest_run import ingest
+from service import repository
+from service.api.clutch import ClutchIn
+from service.changes.edit_clutch import register
+from service.changes.ingest_run import ingest
+from service.runs.json_run import read_run
 from storage.engine.opening import open_database
 from tests.plausibility import slips
 from tests.plausibility.bench import RECEIVED, Bench
@@ -32,7 +32,7 @@ def test_the_history_on_the_bench_is_that_of_the_service(tmp_path: Path) -> None
             bench.accept(body)
             ingest(database, "bench", read_run(json.dumps(body).encode()), received_at=RECEIVED)
         with database.reading() as connection:
-            events = records.state(connection, "bench").events
+            events = repository.state(connection, "bench").events
     assert {event.run_id for event in events if event.dated} == {"s0", "d"}
     for mine, theirs in zip(bench.events, events, strict=True):
         assert mine.cofs.keys() == theirs.cofs.keys()

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from models.rig import campaign
-from service.run_files.simulated import simulated_body
+from service.runs.simulated import simulated_body
 from tests.plausibility import slips
 from tests.plausibility.bench import Bench, Body, with_gain
 from tests.plausibility.honest_lives import KINDS, life

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from service.lives.run_analysis import Analysis
+from service.clutch.analysis import Analysis
 from tests.plausibility import blind, honest_lives, simulated, slips
 from tests.plausibility.ablation import WITHOUT, without
 from tests.plausibility.bench import REFUSED, Answer, Bench, Body

@@ -11,7 +11,7 @@ from models.diagnosis.campaign import Campaign, StationaryRun
 from models.diagnosis.diagnose import diagnose
 from models.diagnosis.report.report import Report
 from models.records.runs import Plateaus
-from service.schemas.clutch import GeometryIn
+from service.api.clutch import GeometryIn
 from tests.blind.rig.sent import in_si
 from tests.measuring import show
 from tests.real.loaders import TRACTION_CLUTCH, traction_runs

@@ -30,7 +30,7 @@ import numpy as np
 
 from models.arrays import FloatArray
 from models.prognosis.criteria import HORIZON
-from models.prognosis.ended_lives import EndedLife, severity_exponent
+from models.prognosis.ended_lives import ObservedLife, severity_exponent
 from models.prognosis.scoring import measured_end
 from models.tracking.measurement import Measurement
 from models.tracking.prior import weak
@@ -124,7 +124,7 @@ WORLDS: dict[str, Callable[[], Iterator[Life]]] = {
 
 
 def with_ended(
-    tests: Sequence[Measurement], end: float, by_count: Mapping[int, Sequence[EndedLife]], rng: np.random.Generator
+    tests: Sequence[Measurement], end: float, by_count: Mapping[int, Sequence[ObservedLife]], rng: np.random.Generator
 ) -> dict[str, dict[str, list[list[float]]]]:
     """By count of ended lives and stage: the outcomes as it is stated, by their ends alone, and by their curves."""
     found: dict[str, dict[str, list[list[float]]]] = {str(count): {} for count in by_count}
@@ -145,7 +145,7 @@ def with_ended(
     return found
 
 
-def _left(life: EndedLife, seen: Sequence[Measurement]) -> float:
+def _left(life: ObservedLife, seen: Sequence[Measurement]) -> float:
     """What was left of an ended life when it had come as far as the last three tests of another have."""
     first = seen[0].value
     damage = float(np.median([(1.0 - test.value / first) / 0.5 for test in seen[-3:]]))
@@ -168,7 +168,7 @@ def judged(half: str, every: int, store: Path) -> Iterator[tuple[str, dict[str, 
                 yield name, known.get(f"{name}/{kind}/{number}", partial(forecasts, lives, ended, number))
 
 
-def forecasts(lives: Sequence[Life], ended: Sequence[EndedLife], number: int) -> dict[str, Any]:
+def forecasts(lives: Sequence[Life], ended: Sequence[ObservedLife], number: int) -> dict[str, Any]:
     """What is said of one of a kind's lives, alone and with others of them."""
     _, tests, end = lives[number]
     rng = np.random.default_rng([SEED, number])

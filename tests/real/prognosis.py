@@ -22,8 +22,8 @@ from models.prognosis.first_passage import ends_of_life, weighted_quantiles
 from models.prognosis.fleet import FleetPrior, population, taught
 from models.tracking.filters.grid import Grid
 from models.tracking.measurement import Measurement
-from models.tracking.posterior import Posterior
-from models.tracking.prior import Prior, weak
+from models.tracking.posterior import TrackPosterior
+from models.tracking.prior import TrackPrior, weak
 from tests.measuring import show
 from tests.models.prognosis.sample_scores import crps_of_sample
 from tests.models.tracking.tracked_series import sent
@@ -37,11 +37,11 @@ LASER_FRACTION, LASER_END = 0.9, 4_000.0
 BLOCKS = 50
 
 
-def drawn(prior: Prior, seen: Sequence[Measurement], rng: np.random.Generator) -> Posterior:
+def drawn(prior: TrackPrior, seen: Sequence[Measurement], rng: np.random.Generator) -> TrackPosterior:
     return GRID.posterior(GRID.from_history(prior, seen), DRAWS, rng)
 
 
-def next_values(posterior: Posterior, progress: float, rng: np.random.Generator) -> FloatArray:
+def next_values(posterior: TrackPosterior, progress: float, rng: np.random.Generator) -> FloatArray:
     """What a measurement at `progress` may be: the course of every draw and its scatter."""
     course = posterior.values(np.array([progress]))[0]
     return course + posterior.scatter * rng.standard_normal(course.size)
@@ -92,14 +92,14 @@ def wandering() -> tuple[float, float]:
 
 def _believed(
     history: list[Measurement], hours: float, fleet: FleetPrior, rng: np.random.Generator
-) -> dict[str, Posterior]:
+) -> dict[str, TrackPosterior]:
     seen = [m for m in history if m.progress <= hours]
     plain = drawn(weak(seen[0], falling=True), seen, rng)
     learned = drawn(fleet.prior_for(seen[0]), seen, rng)
     return {"weak": plain, "of the other 14": fleet.together(plain, learned, seen[0])}
 
 
-def _laser(posterior: Posterior, history: list[Measurement], rng: np.random.Generator) -> tuple[bool, bool, float]:
+def _laser(posterior: TrackPosterior, history: list[Measurement], rng: np.random.Generator) -> tuple[bool, bool, float]:
     """Whether the 90 % interval holds the last value, whether that of the failure holds it (between two inspections, or
     beyond the test), and the stated probability of failing within the test."""
     low, high = weighted_quantiles(next_values(posterior, LASER_END, rng), posterior.weight, (0.05, 0.95))
@@ -140,10 +140,10 @@ def pins() -> list[Row]:
     return rows
 
 
-def _scar_prior(scars: FloatArray) -> Prior:
+def _scar_prior(scars: FloatArray) -> TrackPrior:
     """A prior that knows the size of the scars, and of the scatter from pin to pin that it may be a tenth of it."""
     size = float(scars.mean())
-    return Prior(
+    return TrackPrior(
         initial_mean=0.0,
         initial_sd=size,
         change_mean=size,

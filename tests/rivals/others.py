@@ -12,9 +12,9 @@ from scipy.optimize import curve_fit
 from surpyval import DegradationAnalysis
 from surpyval.degradation import PathModel
 
-from models.degradation.general_order import Degradation, first_passage, progress_fraction
+from models.degradation.general_order import DegradationLaw, first_passage, progress_fraction
 from models.tracking.measurement import Measurement
-from models.tracking.prior import Prior
+from models.tracking.prior import TrackPrior
 from tests.statistical.lives import CAP
 
 Sample = tuple[np.ndarray, np.ndarray]
@@ -27,12 +27,12 @@ AHEAD = 300
 def ends_of(coefficients: np.ndarray) -> Sample:
     """End of life, equally weighted, of rows of (ξ0, Δ, log φ, log ε)."""
     initial, change, log_scale, log_exponent = np.clip(coefficients, -50.0, 50.0).T
-    law = Degradation(initial=initial, change=change, scale=np.exp(log_scale), exponent=np.exp(log_exponent))
+    law = DegradationLaw(initial=initial, change=change, scale=np.exp(log_scale), exponent=np.exp(log_exponent))
     found = np.where(initial <= 0.0, 0.0, first_passage(0.5 * initial, law))
     return np.minimum(found, CAP), np.full(initial.size, 1.0 / initial.size)
 
 
-def prior_moments(prior: Prior) -> tuple[np.ndarray, np.ndarray]:
+def prior_moments(prior: TrackPrior) -> tuple[np.ndarray, np.ndarray]:
     """Mean and variance of (ξ0, Δ, log φ, log ε)."""
     mean = np.array([prior.initial_mean, prior.change_mean, prior.log_scale_mean, prior.log_exponent_mean])
     return mean, np.array([prior.initial_sd, prior.change_sd, prior.log_scale_sd, prior.log_exponent_sd]) ** 2
@@ -41,7 +41,7 @@ def prior_moments(prior: Prior) -> tuple[np.ndarray, np.ndarray]:
 class PlainUkf:
     """filterpy's unscented Kalman filter in (ξ0, Δ, log φ, log ε), started at the prior."""
 
-    def __init__(self, prior: Prior, scatter: float) -> None:
+    def __init__(self, prior: TrackPrior, scatter: float) -> None:
         mean, variance = prior_moments(prior)
         points = MerweScaledSigmaPoints(n=4, alpha=1.0, beta=0.0, kappa=0.0)
         self.filter = UnscentedKalmanFilter(4, 1, 1.0, hx=self.expected, fx=lambda x, _: x, points=points)
@@ -90,7 +90,7 @@ class Progpy:
     """NASA's progpy: its unscented Kalman filter, or its particle filter with a hundredth of the prior's deviations as
     process noise, without which it keeps a single particle."""
 
-    def __init__(self, kind: str, prior: Prior, scatter: float, gap: float) -> None:
+    def __init__(self, kind: str, prior: TrackPrior, scatter: float, gap: float) -> None:
         mean, variance = prior_moments(prior)
         self.model = Law(gap=gap, process_noise=0.0, measurement_noise=scatter)
         start = MultivariateNormalDist(
@@ -139,7 +139,7 @@ class Path(PathModel):
 
     def inv_path(self, y: Any, *params: Any) -> np.ndarray:
         initial, change, log_scale, log_exponent = np.clip(np.array(params), -50.0, 50.0)
-        law = Degradation(initial=initial, change=change, scale=np.exp(log_scale), exponent=np.exp(log_exponent))
+        law = DegradationLaw(initial=initial, change=change, scale=np.exp(log_scale), exponent=np.exp(log_exponent))
         return np.asarray(first_passage(y, law))
 
     def _initial_guess(self, x: np.ndarray, y: np.ndarray) -> list[float]:
@@ -153,7 +153,7 @@ class Surpyval:
     closed form, as progpy's are.
     """
 
-    def __init__(self, prior: Prior, scatter: float) -> None:
+    def __init__(self, prior: TrackPrior, scatter: float) -> None:
         path, x = Path(), np.linspace(0.0, 1e4, 12)
         rng = np.random.default_rng(0)
         fleet = np.array([0.13, -0.09, 8.0, 0.0]) + np.array([0.01, 0.01, 0.3, 0.3]) * rng.standard_normal((12, 4))
@@ -169,7 +169,7 @@ class Surpyval:
         return ends_of(rng.multivariate_normal(found.posterior_mean, found.posterior_cov, DRAWS, check_valid="ignore"))
 
 
-def fitted(measurements: list[Measurement], prior: Prior, rng: np.random.Generator) -> Sample:
+def fitted(measurements: list[Measurement], prior: TrackPrior, rng: np.random.Generator) -> Sample:
     """scipy's `curve_fit` of eq. 6 with a delta-method normal of the end of life."""
     zeta, value = (np.array([getattr(m, name) for m in measurements]) for name in ("progress", "value"))
 

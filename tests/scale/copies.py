@@ -7,11 +7,11 @@ from typing import Any
 import sqlalchemy as sa
 
 from models.rig import campaign
-from service.run_files.json_run import read_run
-from service.run_files.simulated import simulated_body
-from service.schemas.clutch import ClutchIn
-from service.workflows.edit_clutch import register
-from service.workflows.ingest_run import ingest
+from service.api.clutch import ClutchIn
+from service.changes.edit_clutch import register
+from service.changes.ingest_run import ingest
+from service.runs.json_run import read_run
+from service.runs.simulated import simulated_body
 from storage.dialects import TEXT
 from storage.engine.opening import open_database
 from storage.tables import change, channel, clutch, filter_state, metadata, prediction, run

@@ -17,16 +17,16 @@ from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
-from service import records, stored_runs
-from service.work.executor import executor_of
-from service.workflows.replay import clutch_ids, replay
+from service import repository
+from service.changes.replay import clutch_ids, replay
+from service.jobs.executor import executor_of
 from storage.engine.database import Database
 from storage.engine.opening import open_database
 from storage.tables import clutch, corrected_cof, filter_state, fit, prediction, run
 from storage.transfer import digest
 from tests.measuring import table
 from tests.scale.copies import bodies, life, multiply
-from tests.service.work.clusters import local_cluster
+from tests.service.jobs.clusters import local_cluster
 
 #: The tables that hold results.
 RESULTS = (clutch, run, fit, prediction, filter_state, corrected_cof)
@@ -86,13 +86,13 @@ def costs(database: Database) -> dict[str, float]:
     for clutch_id in names:
         marks = [time.process_time()]
         with database.reading() as connection:
-            state = records.state(connection, clutch_id)
-        recorded = stored_runs.recorded(database, state, whole=True)
+            state = repository.state(connection, clutch_id)
+        recorded = repository.recorded(database, state, whole=True)
         marks.append(time.process_time())
-        computed = stored_runs.recomputed(recorded)
+        computed = repository.recomputed(recorded)
         marks.append(time.process_time())
         with database.writing() as connection:
-            records.store(connection, clutch_id, computed)
+            repository.store(connection, clutch_id, computed)
         marks.append(time.process_time())
         for step, began, ended in zip(taken, marks, marks[1:], strict=False):
             taken[step] += 1e3 * (ended - began) / len(names)

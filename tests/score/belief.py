@@ -11,7 +11,7 @@ import numpy as np
 from models.tracking.courses import log_form_weight
 from models.tracking.filters.grid import Grid
 from models.tracking.measurement import Measurement
-from models.tracking.prior import Prior, weak
+from models.tracking.prior import TrackPrior, weak
 from tests.score.table import Scores, joined, percents, written
 from tests.statistical.forecasts import LAWS, observed
 from tests.statistical.lives import PRIOR, STAGES, ends, lives, upto
@@ -24,7 +24,7 @@ KNEE = "a knee at 0.7 of a life"
 BESIDE = ("logarithm", "accelerating (n = -1)", "exponential growth", KNEE)
 
 #: A prior, the tests seen at each stage, the end.
-Case = tuple[Prior, list[list[Measurement]], float, np.random.Generator]
+Case = tuple[TrackPrior, list[list[Measurement]], float, np.random.Generator]
 #: Beliefs or hazards, each with the ends of the draws and their weights.
 Weighed = Iterator[tuple[float, np.ndarray, np.ndarray]]
 
@@ -80,7 +80,7 @@ def _over(scores: Scores, choice: float, least: float) -> tuple[str, str]:
 
 
 def _scored(
-    weighed: Callable[[Prior, list[Measurement], np.random.Generator], Weighed],
+    weighed: Callable[[TrackPrior, list[Measurement], np.random.Generator], Weighed],
     count: int,
     few: int,
     names: Sequence[str],
@@ -96,7 +96,7 @@ def _scored(
         yield scores
 
 
-def _by_hazard(prior: Prior, seen: list[Measurement], rng: np.random.Generator) -> Weighed:
+def _by_hazard(prior: TrackPrior, seen: list[Measurement], rng: np.random.Generator) -> Weighed:
     laid = GRID.posterior(GRID.from_history(replace(prior, knee_hazard=1.0), seen), DRAWS, rng)
     beside = laid.discrepancy
     for hazard in HAZARDS:
@@ -108,7 +108,7 @@ def _by_hazard(prior: Prior, seen: list[Measurement], rng: np.random.Generator) 
         yield hazard, ends(replace(laid, discrepancy=replace(beside, knee=knee))), laid.weight
 
 
-def _by_belief(prior: Prior, seen: list[Measurement], rng: np.random.Generator) -> Weighed:
+def _by_belief(prior: TrackPrior, seen: list[Measurement], rng: np.random.Generator) -> Weighed:
     doubtful = replace(prior, eq_6_share=LAID)
     drawn = GRID.posterior(GRID.from_history(doubtful, seen), DRAWS, rng)
     for share in BELIEFS:

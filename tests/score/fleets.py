@@ -6,7 +6,7 @@ from collections.abc import Callable
 import numpy as np
 
 from models.arrays import FloatArray
-from models.degradation.general_order import Degradation, first_passage
+from models.degradation.general_order import DegradationLaw, first_passage
 from models.prognosis import fleet as of_fleets
 from models.tracking.filters.grid import Grid
 from models.tracking.measurement import Measurement
@@ -28,7 +28,7 @@ EQ_6 = "eq. 6"
 def kind(rng: np.random.Generator, change: float, scale: float, exponent: float) -> Life:
     """A clutch of a kind: 5 % apart in what is lost, a fifth in φ, a tenth in ε."""
     initial = 0.13 * math.exp(0.05 * rng.standard_normal())
-    truth = Degradation(
+    truth = DegradationLaw(
         initial=initial,
         change=-initial * change * math.exp(0.05 * rng.standard_normal()),
         scale=scale * math.exp(0.2 * rng.standard_normal()),

@@ -10,10 +10,10 @@ import numpy as np
 from models.prognosis.first_passage import ends_of_life, predict_first_passage
 from models.rig.truth import draw
 from models.tracking.courses import FORM_COURSE, FORM_PROPORTIONAL, FORM_SIZE, coefficients_at, log_form_weight
-from models.tracking.discrepancy import FUTURE, PAST, Discrepancy
+from models.tracking.discrepancy import FUTURE, PAST, CourseDiscrepancy
 from models.tracking.filters.grid import Grid
 from models.tracking.measurement import Measurement
-from models.tracking.posterior import Posterior
+from models.tracking.posterior import TrackPosterior
 from models.tracking.prior import weak
 from tests.models.tracking.tracked_series import sent
 from tests.score.table import joined, percents, written
@@ -82,7 +82,7 @@ def stated(count: int, seed: int, *, whole: bool) -> tuple[np.ndarray, np.ndarra
     """The probability stated for each of `count` lives [n], and whether it came [n]."""
     rng, told, came, grid = np.random.default_rng(seed), [], [], Grid()
     while len(told) < count:
-        truth = Posterior(
+        truth = TrackPosterior(
             weight=np.ones(1),
             initial=rng.normal(PRIOR.initial_mean, PRIOR.initial_sd, 1),
             change=rng.normal(PRIOR.change_mean, PRIOR.change_sd, 1),
@@ -102,7 +102,7 @@ def stated(count: int, seed: int, *, whole: bool) -> tuple[np.ndarray, np.ndarra
                 continue
             truth = replace(truth, scale=scale, exponent=exponent)
             course = size * PRIOR.size * rng.standard_normal((1, PAST + FUTURE))
-            beside = Discrepancy(
+            beside = CourseDiscrepancy(
                 span=last,
                 size=np.full(1, size),
                 curvature=course,

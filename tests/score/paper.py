@@ -14,18 +14,18 @@ from models.rig.hysteresis import FrictionLag
 from models.rig.sampled import DynamicTest, sampled_test
 from models.rig.stationary import Sensor, stationary_test
 from models.rig.truth import PROTOCOL_PRESSURES, SimulatedClutch, draw
-from service.columns import RADIANS_PER_SECOND_PER_RPM
-from service.lives.assumptions import Assumptions
-from service.lives.criteria import SEVERITY_EXPONENTS
-from service.lives.history import DYNAMIC, STATIONARY, Event, Life, reference_velocities
-from service.lives.payloads import loop_items
-from service.lives.quantities.ends import criterion_end
-from service.lives.quantities.measured import QUANTITIES, SLOPE_SPEEDS, MeasuredLife, posterior_of
-from service.lives.run_analysis import levels_of, mean_cofs
-from service.lives.severity_estimate import severity_estimate
-from service.schemas.life import CriterionIn
+from service.api.life import CriterionIn
+from service.channels import RADIANS_PER_SECOND_PER_RPM
+from service.clutch.analysis import levels_of, mean_cofs
+from service.clutch.assumptions import Assumptions
+from service.clutch.criteria import SEVERITY_EXPONENTS
+from service.clutch.items import loop_items
+from service.clutch.quantities.ends import criterion_end
+from service.clutch.quantities.measured import QUANTITIES, SLOPE_SPEEDS, MeasuredLife, posterior_of
+from service.clutch.severity_estimate import severity_estimate
+from service.clutch.timeline import DYNAMIC, STATIONARY, Event, Life, reference_velocities
 from tests.score.table import Scores, percents, written
-from tests.service.lives import test_assumptions as of_severity
+from tests.service.clutch import test_assumptions as of_severity
 
 #: The pressure level that is scored [bar], and its place among the protocol's.
 LEVEL, PLACE = 5.0, 2

@@ -8,12 +8,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from models.prognosis.criteria import HORIZON
-from models.prognosis.ended_lives import EndedLife
+from models.prognosis.ended_lives import ObservedLife
 from models.prognosis.first_passage import weighted_quantiles
 from models.prognosis.scoring import pit_histogram
 from models.prognosis.stated_end import stated_end
 from models.tracking.measurement import Measurement
-from models.tracking.posterior import Posterior
+from models.tracking.posterior import TrackPosterior
 from tests.measuring import table
 from tests.models.prognosis.sample_scores import crps_of_sample, pit_of_sample
 from tests.statistical.lives import STAGES, ends
@@ -51,7 +51,9 @@ def score(sample: np.ndarray, weight: np.ndarray, end: float) -> Score:
     )
 
 
-def score_of_stated(drawn: Posterior, seen: Sequence[Measurement], ended: Sequence[EndedLife], end: float) -> Score:
+def score_of_stated(
+    drawn: TrackPosterior, seen: Sequence[Measurement], ended: Sequence[ObservedLife], end: float
+) -> Score:
     """The score of what is stated after the tests seen, with ended lives of the kind."""
     now = seen[-1].progress
     stated = stated_end(drawn, fraction=0.5, as_of=now, horizon=HORIZON, ended=ended, tests=seen)
@@ -64,7 +66,7 @@ class Scores:
 
     kept: dict[tuple[Hashable, float], list[Score]] = field(default_factory=lambda: defaultdict(list))
 
-    def add(self, name: Hashable, stage: float, posterior: Posterior, end: float) -> None:
+    def add(self, name: Hashable, stage: float, posterior: TrackPosterior, end: float) -> None:
         self.add_sample(name, stage, ends(posterior), posterior.weight, end)
 
     def add_sample(self, name: Hashable, stage: float, sample: np.ndarray, weight: np.ndarray, end: float) -> None:

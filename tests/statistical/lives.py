@@ -7,17 +7,17 @@ from typing import Any
 
 import numpy as np
 
-from models.degradation.general_order import Degradation, first_passage, value
-from models.prognosis.ended_lives import EndedLife, ended_life, new_and_laws
+from models.degradation.general_order import DegradationLaw, first_passage, value
+from models.prognosis.ended_lives import ObservedLife, ended_life, new_and_laws
 from models.prognosis.first_passage import ends_of_life, weighted_quantiles
 from models.tracking import linear_model, sampling
 from models.tracking.courses import FORM_COURSE, FORM_SIZE, SCALE_SIGN, log_form_weight
 from models.tracking.filters.particle import ParticleState
 from models.tracking.history import History
-from models.tracking.linear_model import Points
+from models.tracking.linear_model import EvaluationPoints
 from models.tracking.measurement import Measurement
-from models.tracking.posterior import Posterior
-from models.tracking.prior import Prior, weak
+from models.tracking.posterior import TrackPosterior
+from models.tracking.prior import TrackPrior, weak
 from tests import dense
 from tests.models.tracking.tracked_series import sent
 
@@ -31,7 +31,7 @@ CAP = 1e6  # an end of life beyond it is scored as if it were there
 class Life:
     """A clutch that was: its coefficients, the scatter of its runs and when its COF was half."""
 
-    truth: Degradation
+    truth: DegradationLaw
     scatter: float
     end: float
 
@@ -56,7 +56,7 @@ def lives(count: int, seed: int) -> Iterator[tuple[Life, np.random.Generator]]:
     found = 0
     while found < count:
         initial = rng.normal(PRIOR.initial_mean, PRIOR.initial_sd)
-        truth = Degradation(
+        truth = DegradationLaw(
             initial=initial,
             change=rng.normal(PRIOR.change_mean, PRIOR.change_sd),
             scale=math.exp(rng.normal(PRIOR.log_scale_mean, PRIOR.log_scale_sd)),
@@ -75,7 +75,7 @@ def typical(count: int, seed: int) -> Iterator[tuple[Life, np.random.Generator]]
     rng = np.random.default_rng(seed)
     for _ in range(count):
         initial = 0.13 * math.exp(rng.normal(0.0, 0.1))
-        truth = Degradation(
+        truth = DegradationLaw(
             initial=initial,
             change=-initial * rng.uniform(0.6, 0.9),
             scale=math.exp(rng.normal(math.log(5_000.0), 0.4)),
@@ -87,7 +87,7 @@ def typical(count: int, seed: int) -> Iterator[tuple[Life, np.random.Generator]]
 
 
 def at_stages(
-    tracker: Any, prior: Prior, measurements: list[Measurement], rng: np.random.Generator
+    tracker: Any, prior: TrackPrior, measurements: list[Measurement], rng: np.random.Generator
 ) -> Iterator[tuple[float, Any]]:
     """The states at the stages of a life whose 25 runs end at 80 % of it: the grid's laid at once, the others' on the
     way."""
@@ -104,12 +104,12 @@ def at_stages(
 
 
 def sampled(
-    prior: Prior, measurements: list[Measurement], points: Points, log_weight: np.ndarray, count: int
-) -> Posterior:
+    prior: TrackPrior, measurements: list[Measurement], points: EvaluationPoints, log_weight: np.ndarray, count: int
+) -> TrackPosterior:
     """`count` draws of equal weight out of weighted points, with their linear terms drawn given each."""
     weight = np.exp(log_weight - log_weight.max())
     index = sampling.systematic(weight, count, 0.5)
-    kept = Points(**{name: getattr(points, name)[..., index] for name in Points.__slots__})
+    kept = EvaluationPoints(**{name: getattr(points, name)[..., index] for name in EvaluationPoints.__slots__})
     history = History.of(measurements, prior)
     rng = np.random.default_rng(1)
     solved, weight = linear_model.pointwise(history, prior, kept), np.full(count, 1.0 / count)
@@ -117,14 +117,16 @@ def sampled(
 
 
 def weighted(
-    prior: Prior, measurements: list[Measurement], points: Points, log_proposal: np.ndarray
+    prior: TrackPrior, measurements: list[Measurement], points: EvaluationPoints, log_proposal: np.ndarray
 ) -> tuple[np.ndarray, float]:
     """Log weights [n] of points by the density written out in full, over their own; and how many they count for. A course
     that ended before the last measurement was none of these."""
     log_likelihood = np.concatenate(
         [
             dense.log_likelihood(
-                prior, measurements, Points(**{k: getattr(points, k)[..., c] for k in Points.__slots__})
+                prior,
+                measurements,
+                EvaluationPoints(**{k: getattr(points, k)[..., c] for k in EvaluationPoints.__slots__}),
             )
             for c in np.array_split(np.arange(points.size.size), max(1, points.size.size // 2_000))
         ]
@@ -136,7 +138,7 @@ def weighted(
     return log_weight, float(weight.sum() ** 2 / np.square(weight).sum())
 
 
-def log_prior(prior: Prior, points: Points) -> np.ndarray:
+def log_prior(prior: TrackPrior, points: EvaluationPoints) -> np.ndarray:
     """Log prior density of points [n], without the constant of the normals."""
     count, share = points.outlying.sum(axis=0), max(prior.outlying_share, 1e-300)
     chance = count * math.log(share) + (points.outlying.shape[0] - count) * math.log1p(-prior.outlying_share)
@@ -145,13 +147,13 @@ def log_prior(prior: Prior, points: Points) -> np.ndarray:
 
 
 def from_prior(
-    prior: Prior, measurements: list[Measurement], count: int, rng: np.random.Generator
-) -> tuple[Posterior, float]:
+    prior: TrackPrior, measurements: list[Measurement], count: int, rng: np.random.Generator
+) -> tuple[TrackPosterior, float]:
     """The exact posterior by `count` draws of the prior, for few measurements; and how many they count for."""
     spread = np.array([prior.log_scale_sd, prior.log_exponent_sd, prior.log_scatter_sd])
     centre = np.array([prior.log_scale_mean, prior.log_exponent_mean, prior.log_scatter_mean])
     normals = centre + spread * rng.standard_normal((count, 3))
-    points = Points(
+    points = EvaluationPoints(
         log_scale=normals[:, 0],
         log_exponent=normals[:, 1],
         log_scatter=normals[:, 2],
@@ -164,7 +166,7 @@ def from_prior(
 
 def exact(
     state: ParticleState, measurements: list[Measurement], count: int, rng: np.random.Generator
-) -> tuple[Posterior, float]:
+) -> tuple[TrackPosterior, float]:
     """The exact posterior by importance sampling, late in life too; and how many draws it counts for.
 
     A particle cloud says where to look, nothing more: points come from Student's t with 4 degrees around random
@@ -192,7 +194,7 @@ def exact(
     chances = 0.9 * chances + 0.1 / chances.size
     form, group = rng.choice(FORM_SIZE.size, size=count, p=forms), rng.choice(chances.size, size=count, p=chances)
     back = proposed @ np.linalg.inv(TURN)
-    points = Points(
+    points = EvaluationPoints(
         log_scale=back[:, 0], log_exponent=back[:, 1], log_scatter=back[:, 2], form=form, outlying=sets[group].T
     )
     log_weight, effective_count = weighted(
@@ -205,18 +207,20 @@ def exact(
 TURN = np.array([[1.0, 0.0, 0.0], [-1.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
 
 
-def taught(tests: Sequence[Measurement], end: float) -> EndedLife:
+def taught(tests: Sequence[Measurement], end: float) -> ObservedLife:
     """What a life with these tests teaches that ended at `end`, with half of its new value."""
     initial, laws = new_and_laws(tests)
     progress, values = np.array([(test.progress, test.value) for test in tests]).T
     return ended_life(progress, values, end, initial=initial, fraction=0.5, laws=laws)
 
 
-def ends(posterior: Posterior) -> np.ndarray:
+def ends(posterior: TrackPosterior) -> np.ndarray:
     return np.minimum(ends_of_life(posterior, 0.5), CAP)
 
 
-def misplaced(reference: Posterior, other: Posterior, of: Callable[[Posterior], np.ndarray] = ends) -> np.ndarray:
+def misplaced(
+    reference: TrackPosterior, other: TrackPosterior, of: Callable[[TrackPosterior], np.ndarray] = ends
+) -> np.ndarray:
     """By how much the quantiles of one sample, of the end of life if nothing else, miss their level under the other."""
     sample = of(reference)
     found = weighted_quantiles(of(other), other.weight, LEVELS)

@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import Bounds, least_squares, minimize
 
 from models.arrays import FloatArray
-from models.friction.identification import FitStatus, StribeckFit, fit_curves, mean_torques
+from models.friction.identification import StribeckFit, StribeckFitStatus, fit_curves, mean_torques
 from models.friction.stribeck import PARAMETER_NAMES
 from models.records.runs import Curve
 from tests.models.friction.stribeck_curves import VELOCITY, clutch, curve, eq3, hard_curve
@@ -130,7 +130,7 @@ def test_the_error_of_eq_5_is_where_noise_alone_puts_it() -> None:
     found = np.array([fit.mse_percent for fit in fits])
     print(f"mean mse {found.mean():.3f} %, expected {expected.mean():.3f} %")
     assert np.mean(found / expected) == pytest.approx(1.0, abs=0.025)
-    assert np.mean([fit.status is FitStatus.UNDETERMINED for fit in fits]) < 0.02
+    assert np.mean([fit.status is StribeckFitStatus.UNDETERMINED for fit in fits]) < 0.02
 
 
 @pytest.mark.parametrize(

@@ -7,15 +7,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from models.degradation.general_order import Degradation, value
+from models.degradation.general_order import DegradationLaw, value
 from models.prognosis.first_passage import weighted_quantiles
 from models.tracking.filters import grid as grid_module
 from models.tracking.filters.grid import Grid
 from models.tracking.filters.particle import Particle
 from models.tracking.filters.ukf import Ukf
 from models.tracking.measurement import Measurement
-from models.tracking.posterior import Posterior
-from models.tracking.prior import Prior, weak
+from models.tracking.posterior import TrackPosterior
+from models.tracking.prior import TrackPrior, weak
 from tests.models.tracking.tracked_series import followed, sent
 from tests.score.table import Scores
 from tests.statistical.lives import (
@@ -35,7 +35,7 @@ from tests.statistical.lives import (
 pytestmark = pytest.mark.slow
 
 
-def check_against(reference: Posterior, count: float, found: Posterior) -> None:
+def check_against(reference: TrackPosterior, count: float, found: TrackPosterior) -> None:
     """The quantiles of each coefficient and of the end of life within four Monte-Carlo deviations of both samples. Draws
     of equal weight were thinned out of weighted ones: they count for half."""
     error = math.sqrt(1.0 / min(count, 4_000) + 1.0 / min(found.effective_draws, 2_000.0))
@@ -111,7 +111,7 @@ def weird(rng: np.random.Generator) -> list[Measurement]:
     """A life that need not obey eq. 6: noise-free, jumping, constant, rising, repeated, gapped, in any unit."""
     runs = int(rng.integers(1, 25))
     progress = np.cumsum(10.0 ** rng.uniform(-3.0, 5.0, runs) * (rng.random(runs) < 0.8)) * (rng.random() < 0.9)
-    truth = Degradation(
+    truth = DegradationLaw(
         initial=1.0,
         change=float(rng.choice([-1.2, -0.6, 0.0, 0.5, 3.0])),
         scale=10.0 ** rng.uniform(1.0, 6.0),
@@ -146,7 +146,7 @@ def test_weird_lives_are_survived(tracker: Any, count: int) -> None:
             assert (np.abs(state.mean) <= 6.0).all()
 
 
-def coverage(count: int, seed: int, belief: Prior, outlying: float = 0.0) -> list[float]:
+def coverage(count: int, seed: int, belief: TrackPrior, outlying: float = 0.0) -> list[float]:
     """How often the 90 % interval of the end of life holds the truth, by stage of life."""
     grid, scores = Grid(), Scores()
     for life, rng in lives(count, seed):

@@ -17,7 +17,7 @@ from alembic.config import Config
 from numpy.typing import NDArray
 from sqlalchemy import Connection, text, true
 
-from storage import channels, clutches, runs
+from storage import clutches, raw_columns, runs
 from storage.checksums import allow_damage, amend
 from storage.clutches import ClutchRow
 from storage.diagnoses import DiagnosisRow
@@ -128,9 +128,9 @@ def write_to(database: Database, function: Callable[..., Any], *arguments: Any, 
 
 
 def store_run(connection: Connection, number: int, *, length: int = 40) -> int:
-    """One accepted run as the workflow writes it: the run, its channels and the clutch's revision."""
+    """One accepted run as a change writes it: the run, its channels and the clutch's revision."""
     run_key = runs.insert(connection, new_run(number))
-    channels.write(connection, run_key, channels.encoded(columns(number, length)))
+    raw_columns.write(connection, run_key, raw_columns.encoded(columns(number, length)))
     clutches.bump_revision(connection, CLUTCH)
     return run_key
 

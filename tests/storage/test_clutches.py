@@ -8,7 +8,7 @@ from sqlalchemy import Connection
 from sqlalchemy.exc import IntegrityError
 
 from storage import clutches, runs
-from storage.clutches import Choice, Counts
+from storage.clutches import ClutchSelection, Counts
 from storage.engine.database import Database
 from tests.storage.samples import CLUTCH, clutch_row, new_run, read_from, write_to
 
@@ -33,9 +33,9 @@ def test_archived_clutches_are_listed_apart(connection: Connection) -> None:
     content = {"record": {"fluid": "new"}, "content_sha256": "cd", "registered": {"fluid": "old"}}
     clutches.set_record(connection, CLUTCH, **content, archived=True)
     assert [row.clutch_id for row in clutches.page(connection, limit=9)] == ["other"]
-    (row,) = clutches.page(connection, Choice(archived=True), limit=9)
+    (row,) = clutches.page(connection, ClutchSelection(archived=True), limit=9)
     assert (row.clutch_id, row.record, row.registered) == (CLUTCH, {"fluid": "new"}, {"fluid": "old"})
-    assert clutches.page(connection, Choice(archived=True), limit=9, after=(row.rank, CLUTCH)) == []
+    assert clutches.page(connection, ClutchSelection(archived=True), limit=9, after=(row.rank, CLUTCH)) == []
 
 
 def test_a_clutch_comes_back_as_it_was_stored_once_and_its_summary_and_revision_change(connection: Connection) -> None:
@@ -73,7 +73,7 @@ FLEET = {
     "gone": (0.5, "normal", "carbon", "ATF", True),
 }
 
-IN_USE = Choice()
+IN_USE = ClutchSelection()
 
 
 @pytest.fixture
@@ -89,32 +89,32 @@ def fleet(database: Database) -> Database:
     return database
 
 
-def ids(database: Database, choice: Choice = IN_USE, *, by_name: bool = False) -> list[str]:
+def ids(database: Database, choice: ClutchSelection = IN_USE, *, by_name: bool = False) -> list[str]:
     return [row.clutch_id for row in read_from(database, clutches.page, choice, limit=9, by_name=by_name)]
 
 
 @pytest.mark.parametrize(
     ("choice", "worst_first"),
     [
-        (Choice(), ["a-2", "b-3", "A-1", "c-4"]),
-        (Choice(archived=True), ["gone"]),
-        (Choice(state="normal"), ["b-3", "A-1"]),
-        (Choice(state="maintenance"), []),
-        (Choice(held=True), ["b-3"]),
-        (Choice(held=True, archived=True), ["gone"]),
-        (Choice(held=True, state="failure"), []),
-        (Choice(only={"A-1", "c-4", "gone"}), ["A-1", "c-4"]),
-        (Choice(find="a-"), ["a-2", "A-1"]),
-        (Choice(find="CARBON"), ["a-2", "b-3"]),
-        (Choice(find="öl 100%"), ["A-1"]),
-        (Choice(find="%"), ["A-1"]),
-        (Choice(find="f_1"), ["a-2"]),
-        (Choice(find="F/1"), ["b-3"]),
-        (Choice(find="\\"), []),
-        (Choice(find="carbon", state="normal", only={"b-3", "c-4"}), ["b-3"]),
+        (ClutchSelection(), ["a-2", "b-3", "A-1", "c-4"]),
+        (ClutchSelection(archived=True), ["gone"]),
+        (ClutchSelection(state="normal"), ["b-3", "A-1"]),
+        (ClutchSelection(state="maintenance"), []),
+        (ClutchSelection(held=True), ["b-3"]),
+        (ClutchSelection(held=True, archived=True), ["gone"]),
+        (ClutchSelection(held=True, state="failure"), []),
+        (ClutchSelection(only={"A-1", "c-4", "gone"}), ["A-1", "c-4"]),
+        (ClutchSelection(find="a-"), ["a-2", "A-1"]),
+        (ClutchSelection(find="CARBON"), ["a-2", "b-3"]),
+        (ClutchSelection(find="öl 100%"), ["A-1"]),
+        (ClutchSelection(find="%"), ["A-1"]),
+        (ClutchSelection(find="f_1"), ["a-2"]),
+        (ClutchSelection(find="F/1"), ["b-3"]),
+        (ClutchSelection(find="\\"), []),
+        (ClutchSelection(find="carbon", state="normal", only={"b-3", "c-4"}), ["b-3"]),
     ],
 )
-def test_a_choice_is_listed_and_counted(fleet: Database, choice: Choice, worst_first: list[str]) -> None:
+def test_a_choice_is_listed_and_counted(fleet: Database, choice: ClutchSelection, worst_first: list[str]) -> None:
     assert ids(fleet, choice) == worst_first
     assert ids(fleet, choice, by_name=True) == sorted(worst_first)
     counts = read_from(fleet, clutches.counts, choice)
@@ -152,16 +152,16 @@ def test_a_part_of_a_list_the_clutch_at_a_share_of_the_ranks_and_what_an_edit_ch
             part = clutches.page(connection, limit=2, left_out=left_out)
             assert [row.clutch_id for row in part] == whole[left_out : left_out + 2]
 
-        def at(share: float, choice: Choice = IN_USE, below: float = 9.0) -> str | None:
+        def at(share: float, choice: ClutchSelection = IN_USE, below: float = 9.0) -> str | None:
             row = clutches.at_rank(connection, choice, share, below=below)
             return None if row is None else row.clutch_id
 
         assert [at(0.0), at(0.5), at(0.9), at(1.0)] == ["a-2", "b-3", "b-3", "A-1"]
         assert at(1.0, below=100.0) == "c-4"
-        assert at(0.9, Choice(only=())) is None
+        assert at(0.9, ClutchSelection(only=())) is None
     content = {"record": {"friction_material": "sintered"}, "content_sha256": "cd", "registered": None}
     write_to(fleet, clutches.set_record, "c-4", **content, archived=False)
-    assert (ids(fleet, Choice(find="SINTER")), ids(fleet, Choice(find="paper"))) == (["c-4"], [])
+    assert (ids(fleet, ClutchSelection(find="SINTER")), ids(fleet, ClutchSelection(find="paper"))) == (["c-4"], [])
 
 
 def test_a_dispute_counts_in_its_life(connection: Connection) -> None:

@@ -18,13 +18,13 @@ from scipy.special import ndtri
 from models.arrays import FloatArray
 from models.tracking.courses import log_scale_at
 from models.tracking.filters import lattice
-from models.tracking.filters.lattice import Frame, Kinds, completed
+from models.tracking.filters.lattice import Kinds, LatticeFrame, completed
 from models.tracking.history import History
-from models.tracking.linear_model import Points, Sums, Terms, evidence, pointwise
+from models.tracking.linear_model import EvaluationPoints, Sums, Terms, evidence, pointwise
 from models.tracking.measurement import Measurement
 from models.tracking.merged_tests import merged
-from models.tracking.posterior import Posterior
-from models.tracking.prior import Prior
+from models.tracking.posterior import TrackPosterior
+from models.tracking.prior import TrackPrior
 from models.tracking.sampling import spread_points, systematic, thinned, with_linear_terms
 
 #: A row cannot resolve a ridge whose width depends on a scatter still unknown; draws are cheap then, and made up to
@@ -38,7 +38,7 @@ BLEND = 0.15
 class GridState:
     """All measurements: the posterior is computed again over the whole history, so nothing else is carried on."""
 
-    prior: Prior
+    prior: TrackPrior
     history: History
 
     def to_arrays(self) -> dict[str, FloatArray]:
@@ -48,7 +48,7 @@ class GridState:
     @classmethod
     def from_arrays(cls, arrays: dict[str, FloatArray]) -> "GridState":
         """The inverse of `to_arrays`."""
-        return cls(prior=Prior.from_array(arrays["prior"]), history=History.from_arrays(arrays))
+        return cls(prior=TrackPrior.from_array(arrays["prior"]), history=History.from_arrays(arrays))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,7 +57,7 @@ class Laid:
     summing to one. `log_evidence` is the log probability of everything measured, up to a constant of the prior."""
 
     kinds: Kinds
-    frame: Frame
+    frame: LatticeFrame
     mass: FloatArray
     log_evidence: float
 
@@ -75,7 +75,7 @@ class Grid:
     rows: int = 21
     levels: int = 11
 
-    def start(self, prior: Prior) -> GridState:
+    def start(self, prior: TrackPrior) -> GridState:
         """Nothing measured."""
         return self.from_history(prior, ())
 
@@ -84,12 +84,12 @@ class Grid:
         return GridState(prior=state.prior, history=state.history.append(measurement, state.prior))
 
     @staticmethod
-    def from_history(prior: Prior, measurements: Sequence[Measurement]) -> GridState:
+    def from_history(prior: TrackPrior, measurements: Sequence[Measurement]) -> GridState:
         """All measurements at once: the same as `update` with one after another, bit for bit."""
         return GridState(prior=prior, history=History.of(measurements, prior))
 
     @staticmethod
-    def from_merged(prior: Prior, measurements: Sequence[Measurement]) -> GridState:
+    def from_merged(prior: TrackPrior, measurements: Sequence[Measurement]) -> GridState:
         """All measurements at once, the older ones of a long history merged: nearly the same posterior at a cost that does
         not grow with their number (`tracking.merged_tests`)."""
         return GridState(prior=prior, history=merged(History.of(measurements, prior), prior))
@@ -106,11 +106,11 @@ class Grid:
         total = mass.sum()
         return Laid(kinds=kinds, frame=frame, mass=mass / total, log_evidence=float(top + np.log(total)))
 
-    def posterior(self, state: GridState, size: int, rng: np.random.Generator) -> Posterior:
+    def posterior(self, state: GridState, size: int, rng: np.random.Generator) -> TrackPosterior:
         """`size` draws: systematic over the cells, evenly spread within them, weighted by the exact density."""
         return self.drawn(state, self.laid(state), size, rng)
 
-    def drawn(self, state: GridState, laid: Laid, size: int, rng: np.random.Generator) -> Posterior:
+    def drawn(self, state: GridState, laid: Laid, size: int, rng: np.random.Generator) -> TrackPosterior:
         """Draws from a posterior that is laid already."""
         prior, history = state.prior, state.history
         offset = rng.random(7)
@@ -122,7 +122,7 @@ class Grid:
 
     def points(
         self, state: GridState, laid: Laid, uniform: FloatArray, offset: float
-    ) -> tuple[Points, FloatArray, tuple[Sums, Terms]]:
+    ) -> tuple[EvaluationPoints, FloatArray, tuple[Sums, Terms]]:
         """Points, placed within their cells by uniform numbers [n, 3], their weights [n], which sum to one, and the closed
         form at each (`linear_model.pointwise`)."""
         prior, history = state.prior, state.history
@@ -156,7 +156,7 @@ def _blended(mass: FloatArray) -> FloatArray:
 
 def _placed(
     laid: Laid, cell: tuple[NDArray[np.intp], ...], uniform: FloatArray, span: float
-) -> tuple[Points, FloatArray]:
+) -> tuple[EvaluationPoints, FloatArray]:
     """Points placed within their cells by uniform numbers [n, 3], and the volume of (log φ, log ε, log s) that each stands
     for [n]."""
     frame, (kind, level, row, node) = laid.frame, cell
@@ -168,7 +168,7 @@ def _placed(
     steps = np.ptp(frame.log_exponent, axis=1) * np.ptp(frame.log_scatter, axis=1)
     log_rate = lower + (upper - lower) * (node + uniform[:, 2] - 0.5) / (nodes - 1)
     log_scale, stretch = log_scale_at(log_rate + log_exponent, laid.kinds.course[kind], span)
-    points = Points(
+    points = EvaluationPoints(
         log_scale=log_scale,
         log_exponent=log_exponent,
         log_scatter=log_scatter,

@@ -27,7 +27,7 @@ from models.arrays import FloatArray
 from models.tracking.courses import (
     FORM_COURSE,
     FORM_SIZE,
-    Course,
+    CourseForm,
     basis,
     form_of,
     log_form_weight,
@@ -37,15 +37,15 @@ from models.tracking.courses import (
 from models.tracking.criteria import DEPTH, MOST, OTHER_SIZES, REACH
 from models.tracking.history import History
 from models.tracking.linear_model import evidence, log_outlying, tabulated
-from models.tracking.outlying_runs import NODES, TEMPER, Nodes, Search, gains
-from models.tracking.prior import Prior
+from models.tracking.outlying_runs import NODES, TEMPER, Nodes, OutlierSearch, gains
+from models.tracking.prior import TrackPrior
 
 #: Nodes along log τ (the first time, and then), log ε and log s while closing in.
 _FIRST, COARSE = 65, (11, 8, 7)
 #: Of each form the one that stands for it on the first lattice, which is so blurred that the law of the scatter and smaller
 #: differences of q hardly matter there: a larger q's mass lies no less wide.
 _FIRST_SIZES = np.where(
-    FORM_COURSE == Course.EQ_6, FORM_SIZE, np.where(OTHER_SIZES[1] >= FORM_SIZE, OTHER_SIZES[1], OTHER_SIZES[-1])
+    FORM_COURSE == CourseForm.EQ_6, FORM_SIZE, np.where(OTHER_SIZES[1] >= FORM_SIZE, OTHER_SIZES[1], OTHER_SIZES[-1])
 )
 _STANDS_FOR = form_of(FORM_COURSE, _FIRST_SIZES, np.zeros(FORM_SIZE.size, dtype=bool))
 LAID_FIRST = np.unique(_STANDS_FOR)
@@ -60,7 +60,7 @@ class Kinds:
     log_weight: FloatArray
 
     @classmethod
-    def of(cls, prior: Prior, outlying: FloatArray, forms: NDArray[np.intp]) -> "Kinds":
+    def of(cls, prior: TrackPrior, outlying: FloatArray, forms: NDArray[np.intp]) -> "Kinds":
         """Every form that the prior allows, with every set [c, t]."""
         weight = log_form_weight(prior)
         possible = forms[np.isfinite(weight[forms])]
@@ -86,7 +86,7 @@ class Kinds:
         return Kinds(**{field.name: getattr(self, field.name)[index] for field in fields(self)})
 
 
-def represented(prior: Prior, laid: Kinds) -> tuple[Kinds, NDArray[np.intp]]:
+def represented(prior: TrackPrior, laid: Kinds) -> tuple[Kinds, NDArray[np.intp]]:
     """All kinds, and which of those `laid` stands for each."""
     weight = log_form_weight(prior)
     groups = [np.flatnonzero((form == _STANDS_FOR) & np.isfinite(weight)) for form in laid.form.tolist()]
@@ -96,7 +96,7 @@ def represented(prior: Prior, laid: Kinds) -> tuple[Kinds, NDArray[np.intp]]:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Frame:
+class LatticeFrame:
     """Where a lattice lies, for each kind: rows of log ε [k, r] and levels of log s [k, l], equidistant, and each row's
     interval of log τ, [k, r]."""
 
@@ -105,10 +105,10 @@ class Frame:
     lower: FloatArray
     upper: FloatArray
 
-    def resized(self, rows: int, levels: int) -> "Frame":
+    def resized(self, rows: int, levels: int) -> "LatticeFrame":
         """The regions with other numbers of rows and levels; intervals are interpolated between rows."""
         log_exponent = _spaced(self.log_exponent[:, 0], self.log_exponent[:, -1], rows)
-        return Frame(
+        return LatticeFrame(
             log_exponent=log_exponent,
             log_scatter=_spaced(self.log_scatter[:, 0], self.log_scatter[:, -1], levels),
             lower=self.at(log_exponent, self.lower),
@@ -133,19 +133,19 @@ class Frame:
         steps = np.ptp(self.log_exponent, axis=1) * np.ptp(self.log_scatter, axis=1)
         return np.asarray((self.upper - self.lower) * steps[:, None] / (nodes - 1))
 
-    def taken(self, index: NDArray[np.intp]) -> "Frame":
+    def taken(self, index: NDArray[np.intp]) -> "LatticeFrame":
         """The lattices of the kinds at `index`."""
-        return Frame(**{field.name: getattr(self, field.name)[index] for field in fields(self)})
+        return LatticeFrame(**{field.name: getattr(self, field.name)[index] for field in fields(self)})
 
 
-def whole(prior: Prior) -> Frame:
+def whole(prior: TrackPrior) -> LatticeFrame:
     """The prior's own range, for a single kind."""
     _, rows, levels = COARSE
     log_exponent = prior.log_exponent_mean + np.linspace(-REACH, REACH, rows) * prior.log_exponent_sd
     low = prior.log_scale_mean - REACH * prior.log_scale_sd
     high = prior.log_scale_mean + REACH * prior.log_scale_sd
     log_scatter = prior.log_scatter_mean + np.linspace(-REACH, REACH, levels) * prior.log_scatter_sd
-    return Frame(
+    return LatticeFrame(
         log_exponent=log_exponent[None],
         log_scatter=log_scatter[None],
         lower=(low - log_exponent)[None],
@@ -153,7 +153,7 @@ def whole(prior: Prior) -> Frame:
     )
 
 
-def tabled(frame: Frame, nodes: int, history: History, course: NDArray[np.intp]) -> FloatArray:
+def tabled(frame: LatticeFrame, nodes: int, history: History, course: NDArray[np.intp]) -> FloatArray:
     """b of courses [k] at every measurement on the cells of all rows, [k, t, rows · nodes]; one frame serves all."""
     log_exponent, by_kind = frame.log_exponent[:, None, :, None], course[:, None, None, None]
     log_scale, _ = log_scale_at(frame.log_rate(nodes)[:, None] + log_exponent, by_kind, history.span)
@@ -162,7 +162,12 @@ def tabled(frame: Frame, nodes: int, history: History, course: NDArray[np.intp])
 
 
 def log_density(
-    prior: Prior, history: History, kinds: Kinds, frame: Frame, table: FloatArray, blur: FloatArray | float = 0.0
+    prior: TrackPrior,
+    history: History,
+    kinds: Kinds,
+    frame: LatticeFrame,
+    table: FloatArray,
+    blur: FloatArray | float = 0.0,
 ) -> FloatArray:
     """Log posterior density up to a constant, [k, levels, rows, nodes]; a frame of one kind serves all."""
     count, rows = kinds.form.size, frame.log_exponent.shape[1]
@@ -178,7 +183,7 @@ def log_density(
     return density
 
 
-def closed_in(prior: Prior, history: History) -> tuple[Kinds, Frame, FloatArray]:
+def closed_in(prior: TrackPrior, history: History) -> tuple[Kinds, LatticeFrame, FloatArray]:
     """The kinds and regions that hold the posterior's mass, by coarse lattices laid over what the last one left; and the
     log mass of each kind [k] on the last of these."""
     first = whole(prior)
@@ -188,7 +193,7 @@ def closed_in(prior: Prior, history: History) -> tuple[Kinds, Frame, FloatArray]
     # for each e-fold of τ between nodes: off by half a step b is off by 0.18 at most, and most of that goes into ξ0 and
     # Δ
     share = 0.03 * float(np.ptp(history.value))
-    table = tabled(first, _FIRST, history, np.array(Course))
+    table = tabled(first, _FIRST, history, np.array(CourseForm))
     blur = share * float((first.upper - first.lower).max()) / (_FIRST - 1)
     kinds, density = _first(prior, history, first, table, blur)
     frame = shrunk(first.taken(np.zeros(kinds.form.size, dtype=np.intp)), density).resized(*COARSE[1:])
@@ -207,7 +212,7 @@ def closed_in(prior: Prior, history: History) -> tuple[Kinds, Frame, FloatArray]
         settled = _shrinkage(wide, closer) > 0.7
         left[now] = ~(settled & (blurs < 0.5 * np.exp(closer.log_scatter.mean(axis=1))))
         shares[now] *= np.where(settled, 0.3, 1.0)  # one that did not shrink is less blurred
-        for field in fields(Frame):
+        for field in fields(LatticeFrame):
             getattr(frame, field.name)[now] = getattr(closer, field.name)
     log_mass[left] = log_mass.max()
     likely_nodes = np.flatnonzero(log_mass > log_mass.max() - 6.0)
@@ -215,8 +220,8 @@ def closed_in(prior: Prior, history: History) -> tuple[Kinds, Frame, FloatArray]
 
 
 def _closer(
-    prior: Prior, history: History, kinds: Kinds, frame: Frame, share: FloatArray
-) -> tuple[Frame, FloatArray, FloatArray]:
+    prior: TrackPrior, history: History, kinds: Kinds, frame: LatticeFrame, share: FloatArray
+) -> tuple[LatticeFrame, FloatArray, FloatArray]:
     """The frame of what a coarse lattice over a frame holds, its log mass [k], and how much it was blurred [k]: by a `share`
     [k] for each e-fold of τ."""
     nodes = COARSE[0]
@@ -225,9 +230,11 @@ def _closer(
     return shrunk(frame, density), log_masses(density, frame.cells(nodes)), blurs
 
 
-def _first(prior: Prior, history: History, frame: Frame, table: FloatArray, blur: float) -> tuple[Kinds, FloatArray]:
+def _first(
+    prior: TrackPrior, history: History, frame: LatticeFrame, table: FloatArray, blur: float
+) -> tuple[Kinds, FloatArray]:
     """The kinds, once it is known which runs may be outlying, and their density on the first coarse lattice."""
-    search, densities = Search.begun(prior, history), {}
+    search, densities = OutlierSearch.begun(prior, history), {}
 
     def looked_at(outlying: FloatArray) -> FloatArray:
         if outlying.tobytes() not in densities:
@@ -244,7 +251,7 @@ def _first(prior: Prior, history: History, frame: Frame, table: FloatArray, blur
 
 
 def _chosen(
-    prior: Prior, history: History, frame: Frame, table: FloatArray, log_mass: FloatArray, blur: float
+    prior: TrackPrior, history: History, frame: LatticeFrame, table: FloatArray, log_mass: FloatArray, blur: float
 ) -> tuple[Nodes, Nodes]:
     """NODES nodes of each level of s, drawn evenly by a power of their mass; and the best one of each level."""
     _, levels, rows, nodes = log_mass.shape
@@ -273,7 +280,7 @@ def log_masses(density: FloatArray, cells: FloatArray) -> FloatArray:
     return np.asarray(top + np.log((off * cells).sum(axis=1)))
 
 
-Part = TypeVar("Part", Kinds, Frame)
+Part = TypeVar("Part", Kinds, LatticeFrame)
 
 
 def joined(first: Part, second: Part) -> Part:
@@ -284,7 +291,7 @@ def joined(first: Part, second: Part) -> Part:
     return replace(first, **columns)
 
 
-def shrunk(frame: Frame, density: FloatArray) -> Frame:
+def shrunk(frame: LatticeFrame, density: FloatArray) -> LatticeFrame:
     """The rows, levels and intervals that hold mass, with a node to spare on either side; as many as before."""
     nodes = density.shape[3]
     by_row = density.max(axis=1)
@@ -295,9 +302,9 @@ def shrunk(frame: Frame, density: FloatArray) -> Frame:
     level_low, level_high = _held(density.max(axis=(2, 3)))
     kind = np.arange(density.shape[0])
     rows, levels = frame.log_exponent, frame.log_scatter
-    within = Frame(log_exponent=rows, log_scatter=levels, lower=lower, upper=upper)
+    within = LatticeFrame(log_exponent=rows, log_scatter=levels, lower=lower, upper=upper)
     log_exponent = _spaced(rows[kind, row_low], rows[kind, row_high], rows.shape[1])
-    return Frame(
+    return LatticeFrame(
         log_exponent=log_exponent,
         log_scatter=_spaced(levels[kind, level_low], levels[kind, level_high], levels.shape[1]),
         lower=within.at(log_exponent, within.lower),
@@ -314,7 +321,7 @@ def _held(density: FloatArray) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     )
 
 
-def _shrinkage(wide: Frame, closer: Frame) -> FloatArray:
+def _shrinkage(wide: LatticeFrame, closer: LatticeFrame) -> FloatArray:
     """The share of the widest interval, of the rows or of the levels that is left, whichever is smallest; [k]."""
     interval = (closer.upper - closer.lower).max(axis=1) / (wide.upper - wide.lower).max(axis=1)
     rows = np.ptp(closer.log_exponent, axis=1) / np.ptp(wide.log_exponent, axis=1)
@@ -327,7 +334,9 @@ def _spaced(low: FloatArray, high: FloatArray, count: int) -> FloatArray:
     return np.asarray(low[..., None] + (high - low)[..., None] * (np.arange(count) / (count - 1)))
 
 
-def completed(prior: Prior, history: History, kinds: Kinds, frame: Frame, log_mass: FloatArray) -> tuple[Kinds, Frame]:
+def completed(
+    prior: TrackPrior, history: History, kinds: Kinds, frame: LatticeFrame, log_mass: FloatArray
+) -> tuple[Kinds, LatticeFrame]:
     """The kinds and their lattices, with those of the sets that were overlooked; `log_mass` [k] says which kinds lead."""
     if prior.outlying_share == 0.0 or history.value.size < 2:
         return kinds, frame
@@ -358,7 +367,9 @@ def completed(prior: Prior, history: History, kinds: Kinds, frame: Frame, log_ma
     return joined(kinds, more), joined(frame, closer)
 
 
-def _nodes(kinds: Kinds, frame: Frame, table: FloatArray, mass: FloatArray, kind: int, relative: FloatArray) -> Nodes:
+def _nodes(
+    kinds: Kinds, frame: LatticeFrame, table: FloatArray, mass: FloatArray, kind: int, relative: FloatArray
+) -> Nodes:
     """32 nodes of one kind, drawn evenly by a power of their mass."""
     drawn, log_share = _tempered(mass[kind].reshape(1, -1), 32)
     level, cell = np.divmod(drawn[0], mass.shape[2] * mass.shape[3])

@@ -22,12 +22,12 @@ from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from models.arrays import FloatArray
-from models.tracking.courses import FORM_COURSE, SCALE_SIGN, Course, log_form_weight, log_scale_at, place_of
+from models.tracking.courses import FORM_COURSE, SCALE_SIGN, CourseForm, log_form_weight, log_scale_at, place_of
 from models.tracking.filters.grid import Grid, GridState
 from models.tracking.history import History
 from models.tracking.linear_model import (
     WHOLE,
-    Points,
+    EvaluationPoints,
     Sums,
     Terms,
     evidence,
@@ -38,8 +38,8 @@ from models.tracking.linear_model import (
     solved_at,
 )
 from models.tracking.measurement import Measurement
-from models.tracking.posterior import Posterior
-from models.tracking.prior import Prior
+from models.tracking.posterior import TrackPosterior
+from models.tracking.prior import TrackPrior
 from models.tracking.sampling import normalised, spread_normals, spread_points, systematic, with_linear_terms
 
 
@@ -64,9 +64,9 @@ class Cloud:
         """The course of every particle [n]."""
         return FORM_COURSE[self.form.astype(np.intp)]
 
-    def placed(self) -> Points:
+    def placed(self) -> EvaluationPoints:
         """The particles as points of the closed form."""
-        return Points(
+        return EvaluationPoints(
             log_scale=self.points[:, 0],
             log_exponent=self.points[:, 1],
             log_scatter=self.points[:, 2],
@@ -76,7 +76,7 @@ class Cloud:
 
 
 def entered(
-    prior: Prior, history: History, cloud: Cloud, rng: np.random.Generator
+    prior: TrackPrior, history: History, cloud: Cloud, rng: np.random.Generator
 ) -> tuple[Cloud, tuple[Sums, Terms] | None]:
     """The particles of all runs of a history but its last, weighted by that one, each with a flag for it drawn from its
     posterior given the rest of the particle; and of a long history, where it is dear and the same whichever points it is
@@ -102,17 +102,17 @@ def entered(
     return weighed, (sums, terms)
 
 
-def log_target_of(history: History, prior: Prior, cloud: Cloud) -> FloatArray:
+def log_target_of(history: History, prior: TrackPrior, cloud: Cloud) -> FloatArray:
     """Log posterior density of every particle, up to a constant."""
     return log_likelihood_of(history, prior, cloud) + _log_prior(prior, cloud)
 
 
-def log_likelihood_of(history: History, prior: Prior, cloud: Cloud) -> FloatArray:
+def log_likelihood_of(history: History, prior: TrackPrior, cloud: Cloud) -> FloatArray:
     """Log probability of the data given every particle."""
     return evidence(pointwise(history, prior, cloud.placed())[0], prior) + _log_alive(history, cloud)
 
 
-def _log_prior(prior: Prior, cloud: Cloud) -> FloatArray:
+def _log_prior(prior: TrackPrior, cloud: Cloud) -> FloatArray:
     flat = prior.log_density(*cloud.points.T) + log_form_weight(prior)[cloud.form.astype(np.intp)]
     return np.asarray(flat + log_outlying(prior, cloud.outlying.T))
 
@@ -140,7 +140,7 @@ class ParticleState:
     """Everything measured and the particles that stand for it; `solved` is the closed form at them where it was just
     found, and is not stored."""
 
-    prior: Prior
+    prior: TrackPrior
     history: History
     cloud: Cloud
     solved: tuple[Sums, Terms] | None = field(default=None, compare=False, repr=False)
@@ -154,7 +154,7 @@ class ParticleState:
     def from_arrays(cls, arrays: dict[str, Any]) -> "ParticleState":
         """The inverse of `to_arrays`."""
         return cls(
-            prior=Prior.from_array(arrays["prior"]),
+            prior=TrackPrior.from_array(arrays["prior"]),
             history=History.from_arrays(arrays),
             cloud=Cloud(**{field.name: arrays[field.name] for field in fields(Cloud)} | _flags(arrays)),
         )
@@ -178,7 +178,7 @@ class Particle:
     moves: int = 8
     moved: float = 0.7
 
-    def start(self, prior: Prior) -> ParticleState:
+    def start(self, prior: TrackPrior) -> ParticleState:
         """Particles spread evenly over the prior, the same every time."""
         centre = np.array([prior.log_scale_mean, prior.log_exponent_mean, prior.log_scatter_mean])
         spread = np.array([prior.log_scale_sd, prior.log_exponent_sd, prior.log_scatter_sd])
@@ -207,7 +207,7 @@ class Particle:
             cloud, solved = self._renewed(prior, history, cloud, rng), None
         return ParticleState(prior=prior, history=history, cloud=cloud, solved=solved)
 
-    def _from_grid(self, prior: Prior, history: History, rng: np.random.Generator) -> Cloud:
+    def _from_grid(self, prior: TrackPrior, history: History, rng: np.random.Generator) -> Cloud:
         """Weighted points of the exact posterior."""
         state, offset = GridState(prior=prior, history=history), rng.random(4)
         uniform = spread_points(self.particles, offset[:3])
@@ -221,7 +221,7 @@ class Particle:
         )
         return replace(cloud, log_target=log_target_of(history, prior, cloud))
 
-    def _renewed(self, prior: Prior, history: History, cloud: Cloud, rng: np.random.Generator) -> Cloud:
+    def _renewed(self, prior: TrackPrior, history: History, cloud: Cloud, rng: np.random.Generator) -> Cloud:
         """Resampled, and moved by steps of a random walk shaped like the cloud."""
         weight, span = normalised(cloud.log_weight), history.span
         shapes = _shapes(cloud, weight, span)
@@ -240,7 +240,7 @@ class Particle:
                 break
         return cloud
 
-    def posterior(self, state: ParticleState, size: int, rng: np.random.Generator) -> Posterior:
+    def posterior(self, state: ParticleState, size: int, rng: np.random.Generator) -> TrackPosterior:
         """`size` draws of equal weight: systematic over the particles, with evenly spread draws of (ξ0, Δ)."""
         cloud, offset = state.cloud, rng.random(3)
         index = systematic(normalised(cloud.log_weight), size, float(offset[2]))
@@ -262,7 +262,7 @@ def _places(cloud: Cloud, span: float) -> FloatArray:
 
 def _shapes(cloud: Cloud, weight: FloatArray, span: float) -> FloatArray:
     """A square root of the covariance of the places of each course's particles [6, 3, 3]."""
-    shapes, places = np.zeros((len(Course), 3, 3)), _places(cloud, span)
+    shapes, places = np.zeros((len(CourseForm), 3, 3)), _places(cloud, span)
     for course in np.unique(cloud.course):
         in_course = cloud.course == course
         share = weight[in_course] / max(float(weight[in_course].sum()), 1e-300)
@@ -274,11 +274,11 @@ def _shapes(cloud: Cloud, weight: FloatArray, span: float) -> FloatArray:
 def _kept(course: NDArray[np.intp], weight: FloatArray, least: float = 0.05) -> tuple[FloatArray, FloatArray]:
     """How often to take each particle, so that every course keeps at `least` a share, and the log weight that makes up for
     it [n]: what the data do not speak for today they may speak for later."""
-    share = np.bincount(course, weights=weight, minlength=len(Course))
+    share = np.bincount(course, weights=weight, minlength=len(CourseForm))
     alive = share > 1e-100  # what makes up for it must not overflow
     shares = np.where(alive, np.maximum(share, least), share)
     shares /= shares.sum()
-    more = np.divide(shares, share, out=np.ones(len(Course)), where=alive)[course]
+    more = np.divide(shares, share, out=np.ones(len(CourseForm)), where=alive)[course]
     return weight * more, -np.log(more)
 
 

@@ -52,8 +52,8 @@ from models.tracking.filters.grid import Grid, GridState
 from models.tracking.filters.particle import Particle, ParticleState, log_likelihood_of
 from models.tracking.history import History
 from models.tracking.measurement import Measurement
-from models.tracking.posterior import Posterior
-from models.tracking.prior import Prior
+from models.tracking.posterior import TrackPosterior
+from models.tracking.prior import TrackPrior
 from models.tracking.sampling import normalised, spread_normals, systematic
 
 #: Numbers of a state before its steps.
@@ -77,7 +77,7 @@ class UkfState:
     running mean of squared innovations.
     """
 
-    prior: Prior
+    prior: TrackPrior
     history: History
     reference: float
     squared_innovation: float
@@ -103,7 +103,7 @@ class UkfState:
         """The inverse of `to_arrays`."""
         reference, squared_innovation = arrays["place"].tolist()
         return cls(
-            prior=Prior.from_array(arrays["prior"]),
+            prior=TrackPrior.from_array(arrays["prior"]),
             history=History.from_arrays(arrays),
             reference=reference,
             squared_innovation=squared_innovation,
@@ -205,7 +205,7 @@ def coefficients(
     return coefficients_at(log_scale, log_exponent, course)
 
 
-def _units(prior: Prior, dimension: int) -> tuple[FloatArray, FloatArray]:
+def _units(prior: TrackPrior, dimension: int) -> tuple[FloatArray, FloatArray]:
     """Centres and units of (ξ0, ξ at the reference, log τ, log ε, δ, T δ', steps)."""
     level, rate = prior.initial_mean, prior.log_scale_mean - prior.log_exponent_mean
     centre, unit = np.zeros(dimension), np.full(dimension, prior.initial_sd)
@@ -214,7 +214,7 @@ def _units(prior: Prior, dimension: int) -> tuple[FloatArray, FloatArray]:
     return centre, unit
 
 
-def scaled(prior: Prior, points: FloatArray) -> FloatArray:
+def scaled(prior: TrackPrior, points: FloatArray) -> FloatArray:
     """Rows of (ξ0, ξ at the reference, place, log ε, δ, T δ', steps) as states [n, d]."""
     centre, unit = _units(prior, points.shape[1])
     rows = points.copy()
@@ -222,7 +222,7 @@ def scaled(prior: Prior, points: FloatArray) -> FloatArray:
     return np.asarray((rows - centre) / unit)
 
 
-def unscaled(prior: Prior, state: FloatArray) -> FloatArray:
+def unscaled(prior: TrackPrior, state: FloatArray) -> FloatArray:
     """The inverse of `scaled`, for states [..., d]; states far out of the domain are moved to its edge."""
     centre, unit = _units(prior, state.shape[-1])
     rows = centre + unit * np.clip(state, -2.0 * DOMAIN, 2.0 * DOMAIN)
@@ -231,7 +231,7 @@ def unscaled(prior: Prior, state: FloatArray) -> FloatArray:
 
 
 def scatter_learnt(
-    prior: Prior,
+    prior: TrackPrior,
     scatter: FloatArray,
     squared: FloatArray | float,
     variance: FloatArray | float,
@@ -270,7 +270,7 @@ class Ukf:
     name: ClassVar[str] = "ukf"
     together: int = 4
 
-    def start(self, prior: Prior) -> UkfState:
+    def start(self, prior: TrackPrior) -> UkfState:
         """The prior itself, without normals, which the first measurements make together."""
         return UkfState(
             prior=prior,
@@ -302,7 +302,7 @@ class Ukf:
             return _started(prior, history)
         return updated
 
-    def posterior(self, state: UkfState, size: int, rng: np.random.Generator) -> Posterior:
+    def posterior(self, state: UkfState, size: int, rng: np.random.Generator) -> TrackPosterior:
         """`size` evenly spread draws of equal weight from the normals, those left out whose course would have ended before
         the last measurement; the scatter is a point estimate of each."""
         prior, history = state.prior, state.history
@@ -323,7 +323,7 @@ class Ukf:
         heights = np.stack(discrepancy_terms[2:], axis=1) if len(discrepancy_terms) > 2 else np.zeros((size, 0))
         weight = np.where((scale < 0.0) & (-scale <= history.span), 0.0, 1.0)
         weight = weight if weight.any() else np.ones(size)
-        return Posterior(
+        return TrackPosterior(
             weight=weight / weight.sum(),
             initial=initial,
             change=change,
@@ -347,7 +347,7 @@ def _over(state: UkfState) -> float:
     return float(normalised(state.log_weight)[ends] @ ndtr((math.log(gap) - mean) / np.sqrt(variance)))
 
 
-def _before_the_start(prior: Prior, history: History, size: int, rng: np.random.Generator) -> Posterior:
+def _before_the_start(prior: TrackPrior, history: History, size: int, rng: np.random.Generator) -> TrackPosterior:
     """`size` draws given a few measurements: of evenly spread ones of the prior, by the evidence."""
     cloud = _PRIOR.start(prior).cloud
     outlying = rng.random((_PRIOR.particles, history.value.size)) < prior.outlying_share
@@ -356,7 +356,7 @@ def _before_the_start(prior: Prior, history: History, size: int, rng: np.random.
     return _PRIOR.posterior(ParticleState(prior=prior, history=history, cloud=cloud), size, rng)
 
 
-def _started(prior: Prior, history: History) -> UkfState:
+def _started(prior: TrackPrior, history: History) -> UkfState:
     """The normals with the moments of the exact posterior, by form, from evenly spread draws: as many again for every so
     many events, each of which has a moment of its own."""
     many = 3_000 * (1 + history.steps.size // 20)
@@ -399,7 +399,7 @@ def _started(prior: Prior, history: History) -> UkfState:
     )
 
 
-def _beside(draws: Posterior, steps: int) -> tuple[FloatArray, FloatArray]:
+def _beside(draws: TrackPosterior, steps: int) -> tuple[FloatArray, FloatArray]:
     """Of every draw (δ, T δ') at the end of what was measured [n, 2], and the level's steps [n, steps]."""
     discrepancy = draws.discrepancy
     if discrepancy is None:

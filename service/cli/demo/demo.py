@@ -54,7 +54,7 @@ def _life(service: Service, seed: int) -> None:
     """Post the life with its inspections, and have it diagnosed: nothing comes later that the diagnosis has not seen."""
     from models.rig import campaign  # start-up time
     from service.cli.demo import life  # start-up time
-    from service.run_files import simulated  # start-up time
+    from service.runs import simulated  # start-up time
 
     clutch_id, truth = f"sim-{seed}", campaign.simulated_clutch(seed)
     end = truth.end_of_life()

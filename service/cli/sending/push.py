@@ -23,7 +23,7 @@ from service.cli.sending.spool import (
 )
 from service.client.clutchlife.answers import RefusedError, ServiceAwayError
 from service.client.clutchlife.transport import Service, connect
-from service.run_files import manifest
+from service.runs import manifest
 
 SPOOL = default_folder()
 _REMEDY = (

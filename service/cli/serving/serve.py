@@ -114,9 +114,9 @@ def _allowed(host: str, settings: "Settings") -> str:
 
     Raises ServiceRuns where another service uses the database, and what `open_database` raises.
     """
+    from service.changes import raw_records  # start-up time
     from service.readers.confinement import missing  # start-up time
     from service.web.auth import is_loopback  # start-up time
-    from service.workflows import raw_records  # start-up time
     from storage import keys  # start-up time
     from storage.engine.opening import open_database, service_lock  # start-up time
 

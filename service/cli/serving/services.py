@@ -16,11 +16,11 @@ from uvicorn.config import STARTUP_FAILURE
 from uvicorn.supervisors import Multiprocess
 
 from service.app import create_app
+from service.jobs.background import end_with_parent, use_one_blas_thread
 from service.logging import configure
 from service.settings import Settings
 from service.web.connections import allow_many, bounded
 from service.web.metrics import FOLDER_VARIABLE
-from service.work.background import end_with_parent, use_one_blas_thread
 
 #: [s] After which a process that does not answer its parent is taken for hung, and replaced. Chosen: one that starts loads
 #: the libraries first, beside all others on a busy machine.

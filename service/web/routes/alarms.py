@@ -9,14 +9,14 @@ from fastapi.responses import Response
 from pydantic import Field
 
 from service.alarms.notify import require_address
-from service.queries import alarms
-from service.schemas import alarm as schemas
-from service.schemas.base import IDENTIFIER_PATTERN, LONGEST_IDENTIFIER
+from service.answers import alarms
+from service.api import alarm as api
+from service.api.base import IDENTIFIER_PATTERN, LONGEST_IDENTIFIER
+from service.changes import change_alarms
 from service.web import auth
-from service.web.answers import Paged, answer, json_answer, now, sent, taking, until_ended
 from service.web.context import Context
 from service.web.problems import CHANGING, READING, SENDING
-from service.workflows import change_alarms
+from service.web.responses import Paged, answer, json_answer, now, sent, taking, until_ended
 
 router = APIRouter(prefix="/v1/alarms", tags=["alarms"])
 webhook_router = APIRouter(prefix="/v1/webhooks", tags=["alarms"])
@@ -39,7 +39,7 @@ OfClutch = Annotated[
 ]
 
 
-@router.get("", response_model=schemas.AlarmPage, responses=READING)
+@router.get("", response_model=api.AlarmPage, responses=READING)
 async def list_alarms(request: Request, context: auth.OwnReader, part: Paged) -> Response:
     """Rules by name. A key that is bound to clutches gets the rules of these clutches."""
     return await answer(request, alarms.page, context.database, part, only=auth.grant_of(request).clutches)
@@ -48,14 +48,14 @@ async def list_alarms(request: Request, context: auth.OwnReader, part: Paged) ->
 @router.post(
     "",
     status_code=201,
-    **taking(schemas.AlarmIn, schemas.AlarmOut, schemas.EXAMPLE, SENDING, {200: "The rule existed before"}),
+    **taking(api.AlarmIn, api.AlarmOut, api.EXAMPLE, SENDING, {200: "The rule existed before"}),
 )
 async def post_alarm(request: Request, context: auth.OwnIngester) -> Response:
     """Create a rule. Clutches that already pass its limit raise an alarm at once."""
     return await _saved(request, context, None)
 
 
-@router.get("/events", response_model=schemas.EventPage, responses=READING)
+@router.get("/events", response_model=api.EventPage, responses=READING)
 async def list_events(
     request: Request,
     context: auth.OwnReader,
@@ -72,7 +72,7 @@ async def list_events(
     return await answer(request, alarms.events, context.database, part, state=state, alarm_id=alarm_id, only=clutches)
 
 
-@router.get("/events/{event_id}", response_model=schemas.EventOut, responses=READING)
+@router.get("/events/{event_id}", response_model=api.EventOut, responses=READING)
 async def read_event(request: Request, context: auth.OwnReader, event_id: EventId) -> Response:
     """One alarm."""
     return await answer(request, alarms.event, context.database, event_id, only=auth.grant_of(request).clutches)
@@ -80,24 +80,24 @@ async def read_event(request: Request, context: auth.OwnReader, event_id: EventI
 
 @router.post(
     "/events/{event_id}/acknowledge",
-    **taking(schemas.AcknowledgeIn, schemas.EventOut, {"note": "ordered"}, required=False),
+    **taking(api.AcknowledgeIn, api.EventOut, {"note": "ordered"}, required=False),
 )
 async def acknowledge_event(request: Request, context: auth.OwnIngester, event_id: EventId) -> Response:
     """Acknowledge an alarm: somebody has seen it. The body is optional."""
-    remark = await sent(request, schemas.AcknowledgeIn) if await request.body() else schemas.AcknowledgeIn()
+    remark = await sent(request, api.AcknowledgeIn) if await request.body() else api.AcknowledgeIn()
     grant = auth.grant_of(request)
     await run_in_threadpool(alarms.event, context.database, event_id, only=grant.clutches)
     acknowledge = partial(change_alarms.acknowledge, note=remark.note, by=grant.name, at=now())
     return json_answer(await run_in_threadpool(acknowledge, context.database, event_id))
 
 
-@router.get("/{alarm_id}", response_model=schemas.AlarmOut, responses=READING)
+@router.get("/{alarm_id}", response_model=api.AlarmOut, responses=READING)
 async def read_alarm(request: Request, context: auth.OwnReader, alarm_id: AlarmId) -> Response:
     """A rule in force."""
     return await answer(request, alarms.look_up, context.database, alarm_id, only=auth.grant_of(request).clutches)
 
 
-@router.put("/{alarm_id}", **taking(schemas.AlarmIn, schemas.AlarmOut, schemas.EXAMPLE))
+@router.put("/{alarm_id}", **taking(api.AlarmIn, api.AlarmOut, api.EXAMPLE))
 async def put_alarm(request: Request, context: auth.OwnAdmin, alarm_id: AlarmId) -> Response:
     """Replace a rule. Alarms that the new rule would not raise are cleared."""
     await run_in_threadpool(alarms.look_up, context.database, alarm_id, only=auth.grant_of(request).clutches)
@@ -112,7 +112,7 @@ async def delete_alarm(request: Request, context: auth.OwnAdmin, alarm_id: Alarm
     return Response(status_code=204)
 
 
-@router.post("/{alarm_id}/test", response_model=schemas.TestedOut, responses=CHANGING)
+@router.post("/{alarm_id}/test", response_model=api.TestedOut, responses=CHANGING)
 async def test_alarm(request: Request, context: auth.OwnAdmin, alarm_id: AlarmId) -> Response:
     """Send a test to each of the rule's receivers, and report the results, at the latest after 12 s."""
     await run_in_threadpool(alarms.look_up, context.database, alarm_id, only=auth.grant_of(request).clutches)
@@ -120,7 +120,7 @@ async def test_alarm(request: Request, context: auth.OwnAdmin, alarm_id: AlarmId
     return await _tested(context, names)
 
 
-@webhook_router.get("", response_model=schemas.WebhookPage, responses=READING)
+@webhook_router.get("", response_model=api.WebhookPage, responses=READING)
 async def list_webhooks(request: Request, context: auth.Reader, part: Paged) -> Response:
     """Receivers; the addresses are shown without secrets."""
     return await answer(request, alarms.receivers_by_name, context.database, part)
@@ -129,13 +129,11 @@ async def list_webhooks(request: Request, context: auth.Reader, part: Paged) -> 
 @webhook_router.post(
     "",
     status_code=201,
-    **taking(
-        schemas.WebhookIn, schemas.WebhookOut, {"url": "https://example.org/hook", "secret": "wet-clutch-7000"}, SENDING
-    ),
+    **taking(api.WebhookIn, api.WebhookOut, {"url": "https://example.org/hook", "secret": "wet-clutch-7000"}, SENDING),
 )
 async def post_webhook(request: Request, context: auth.Admin) -> Response:
     """Add a receiver. Without a secret, the service makes one and shows it once."""
-    receiver = await sent(request, schemas.WebhookIn)
+    receiver = await sent(request, api.WebhookIn)
     private = await run_in_threadpool(
         change_alarms.inside_allowed, context.database, context.settings.private_receivers
     )
@@ -146,7 +144,7 @@ async def post_webhook(request: Request, context: auth.Admin) -> Response:
     return json_answer(alarms.receiver_out(row, secret=new_secret), 201, Location=f"/v1/webhooks/{row.webhook_id}")
 
 
-@webhook_router.get("/{webhook_id}", response_model=schemas.WebhookOut, responses=READING)
+@webhook_router.get("/{webhook_id}", response_model=api.WebhookOut, responses=READING)
 async def read_webhook(request: Request, context: auth.Reader, webhook_id: WebhookId) -> Response:
     """A receiver; its address is shown without secrets."""
     return await answer(request, alarms.receiver, context.database, webhook_id)
@@ -159,13 +157,13 @@ async def delete_webhook(context: auth.Admin, webhook_id: WebhookId) -> Response
     return Response(status_code=204)
 
 
-@webhook_router.get("/{webhook_id}/deliveries", response_model=schemas.DeliveryPage, responses=READING)
+@webhook_router.get("/{webhook_id}/deliveries", response_model=api.DeliveryPage, responses=READING)
 async def list_deliveries(request: Request, context: auth.Reader, webhook_id: WebhookId, part: Paged) -> Response:
     """The deliveries of a receiver, sent or waiting, newest first."""
     return await answer(request, alarms.deliveries, context.database, webhook_id, part)
 
 
-@webhook_router.post("/{webhook_id}/test", response_model=schemas.TestedOut, responses=CHANGING)
+@webhook_router.post("/{webhook_id}/test", response_model=api.TestedOut, responses=CHANGING)
 async def test_webhook(context: auth.Admin, webhook_id: WebhookId) -> Response:
     """Send a test to a receiver, and report the result, at the latest after 12 s."""
     names = await run_in_threadpool(change_alarms.test_receiver, context.database, webhook_id, at=now())
@@ -173,7 +171,7 @@ async def test_webhook(context: auth.Admin, webhook_id: WebhookId) -> Response:
 
 
 async def _saved(request: Request, context: Context, alarm_id: str | None) -> Response:
-    rule = await sent(request, schemas.AlarmIn)
+    rule = await sent(request, api.AlarmIn)
     auth.require_clutch(auth.grant_of(request), rule.clutch_id)
     by, save = auth.grant_of(request).name, change_alarms.save
     row, new = await run_in_threadpool(save, context.database, rule, by=by, at=now(), alarm_id=alarm_id)

@@ -8,21 +8,21 @@ from fastapi import APIRouter, Request
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import Response
 
-from service.queries import clutch_list, fleet_priors, runs, scores
-from service.queries.cache import to_json
-from service.queries.degradation import degradation
-from service.schemas.clutch import ClutchEdit, ClutchIn, ClutchOut, ClutchPage
-from service.schemas.fleet import FleetPriorPage, FleetScores, FleetTotals
-from service.schemas.life import Method
-from service.schemas.parameters import Archived, ClutchId, ClutchStateName, Find, Held, Offset, Sort
-from service.schemas.run import ChangePage
-from service.web import answers, auth
+from service.answers import clutch_list, fleet_priors, runs, scores
+from service.answers.cache import to_json
+from service.answers.degradation import degradation
+from service.api.clutch import ClutchEdit, ClutchIn, ClutchOut, ClutchPage
+from service.api.fleet import FleetPriorPage, FleetScores, FleetTotals
+from service.api.life import Method
+from service.api.parameters import Archived, ClutchId, ClutchStateName, Find, Held, Offset, Sort
+from service.api.run import ChangePage
+from service.changes import edit_clutch as registration
+from service.changes.edit_clutch import edit
+from service.web import auth, responses
 from service.web.context import Context
 from service.web.middleware import remember
 from service.web.problems import READING, SENDING
-from service.workflows import edit_clutch as registration
-from service.workflows.edit_clutch import edit
-from storage.clutches import Choice
+from storage.clutches import ClutchSelection
 
 router = APIRouter(prefix="/v1/clutches", tags=["clutches"])
 fleet_router = APIRouter(prefix="/v1/fleet", tags=["fleet"])
@@ -43,20 +43,20 @@ EXAMPLE = {
 @router.post(
     "",
     status_code=201,
-    **answers.taking(ClutchIn, ClutchOut, EXAMPLE, SENDING, {200: "Known already, with the same content"}),
+    **responses.taking(ClutchIn, ClutchOut, EXAMPLE, SENDING, {200: "Known already, with the same content"}),
 )
 async def register_clutch(request: Request, context: auth.OwnIngester) -> Response:
     """Register a clutch. Everything but `clutch_id` has a default: the reference's clutch."""
-    fields = await answers.sent(request, ClutchIn)
+    fields = await responses.sent(request, ClutchIn)
     auth.require_clutch(auth.grant_of(request), fields.clutch_id)
     clutch, new = await run_in_threadpool(_register, context, fields)
     if new:
-        await answers.begin_computed(context, str(clutch["clutch_id"]), degradation)
-    return answers.json_answer(clutch, 201 if new else 200, Location=f"/v1/clutches/{clutch['clutch_id']}")
+        await responses.begin_computed(context, str(clutch["clutch_id"]), degradation)
+    return responses.json_answer(clutch, 201 if new else 200, Location=f"/v1/clutches/{clutch['clutch_id']}")
 
 
 def _register(context: Context, clutch: ClutchIn) -> tuple[dict[str, object], bool]:
-    new = registration.register(context.database, clutch, created_at=answers.now())
+    new = registration.register(context.database, clutch, created_at=responses.now())
     return clutch_list.look_up(context.database, clutch.clutch_id), new
 
 
@@ -64,7 +64,7 @@ def _register(context: Context, clutch: ClutchIn) -> tuple[dict[str, object], bo
 async def list_clutches(
     request: Request,
     context: auth.OwnReader,
-    part: answers.Paged,
+    part: responses.Paged,
     archived: Archived = False,
     state: ClutchStateName = None,
     held: Held = False,
@@ -75,7 +75,7 @@ async def list_clutches(
     """The clutches of the key, with health and remaining life: the lowest safe bound first, or by name. To read all
     of them, sort by name: then none is missed or repeated.
     """
-    choice = Choice(archived=archived, only=auth.grant_of(request).clutches, state=state, held=held, find=find)
+    choice = ClutchSelection(archived=archived, only=auth.grant_of(request).clutches, state=state, held=held, find=find)
     make = partial(clutch_list.page_as_json, context.database, context.cache, choice, part, offset=offset, sort=sort)
     return await _answer_about_all_clutches(request, context, ("clutches", choice, part, offset, sort), make)
 
@@ -83,7 +83,7 @@ async def list_clutches(
 @totals_router.get("/totals", response_model=FleetTotals, responses=READING)
 async def totals(request: Request, context: auth.OwnReader, archived: Archived = False, find: Find = "") -> Response:
     """The number of the key's clutches, by state."""
-    choice = Choice(archived=archived, only=auth.grant_of(request).clutches, find=find)
+    choice = ClutchSelection(archived=archived, only=auth.grant_of(request).clutches, find=find)
     return await _answer_about_all_clutches(
         request, context, ("totals", choice), lambda: to_json(clutch_list.totals(context.database, choice))
     )
@@ -94,50 +94,50 @@ async def _answer_about_all_clutches(
 ) -> Response:
     """A GET's answer that any commit may change, made once for what is committed."""
     # the version before the rows are read: what is committed meanwhile makes another
-    answer = await answers.cached_answer(context, key, auth.snapshot_of(request).version, make)
+    answer = await responses.cached_answer(context, key, auth.snapshot_of(request).version, make)
     if auth.grant_of(request).clutches is None:
-        remember(request, answers.repeated_answer(context, key, of_clutch=False))
-    return answers.tagged(request, answer, answers.JSON_TYPE)
+        remember(request, responses.repeated_answer(context, key, of_clutch=False))
+    return responses.tagged(request, answer, responses.JSON_TYPE)
 
 
 @router.get("/{clutch_id}", response_model=ClutchOut, responses=READING)
 async def read_clutch(request: Request, context: auth.Reader, clutch_id: ClutchId) -> Response:
     """One clutch."""
-    return await answers.answer(request, clutch_list.look_up, context.database, clutch_id)
+    return await responses.answer(request, clutch_list.look_up, context.database, clutch_id)
 
 
 @router.patch(
     "/{clutch_id}",
-    **answers.taking(
+    **responses.taking(
         ClutchEdit,
         ClutchOut,
         {"reason": "the drawing says so", "geometry": {"inner_diameter_mm": 98, "outer_diameter_mm": 133}},
     ),
 )
-async def edit_clutch(of: answers.ChangeOf) -> Response:
+async def edit_clutch(of: responses.ChangeOf) -> Response:
     """Edit a clutch's record (each field in the request replaces the whole field), archive the clutch or bring it
     back. Results are computed again.
     """
-    fields, by = await answers.sent(of.request, ClutchEdit), auth.grant_of(of.request).name
-    change = partial(edit, archived=fields.archived, reason=fields.reason, by=by, at=answers.now())
-    await answers.changed(of, change, fields.fields())
-    return answers.json_answer(await run_in_threadpool(clutch_list.look_up, of.database, of.clutch_id))
+    fields, by = await responses.sent(of.request, ClutchEdit), auth.grant_of(of.request).name
+    change = partial(edit, archived=fields.archived, reason=fields.reason, by=by, at=responses.now())
+    await responses.changed(of, change, fields.fields())
+    return responses.json_answer(await run_in_threadpool(clutch_list.look_up, of.database, of.clutch_id))
 
 
 @router.get("/{clutch_id}/changes", response_model=ChangePage, responses=READING)
-async def list_changes(of: answers.PageOf) -> Response:
+async def list_changes(of: responses.PageOf) -> Response:
     """The audit trail of the clutch and its runs: who changed what, when and why, newest first."""
-    return await answers.clutch_answer(of, runs.trail, of.part)
+    return await responses.clutch_answer(of, runs.trail, of.part)
 
 
 @fleet_router.get("/priors", response_model=FleetPriorPage, responses=READING)
-async def priors(request: Request, context: auth.Reader, part: answers.WholePaged) -> Response:
+async def priors(request: Request, context: auth.Reader, part: responses.WholePaged) -> Response:
     """The priors learned from the clutches of each kind."""
-    return await answers.answer(request, lambda: part.sliced(fleet_priors.newest(context.database)))
+    return await responses.answer(request, lambda: part.sliced(fleet_priors.newest(context.database)))
 
 
 @fleet_router.get("/scores", response_model=FleetScores, responses=READING)
 async def fleet_scores(request: Request, context: auth.Reader, method: Method = "particle") -> Response:
     """Scores of the predictions of all ended lives."""
-    scored = await answers.computed_of_each(request, context, scores.scores_of_clutch, method)
-    return await answers.answer(request, scores.scores_of_fleet, scored, method=method)
+    scored = await responses.computed_of_each(request, context, scores.scores_of_clutch, method)
+    return await responses.answer(request, scores.scores_of_fleet, scored, method=method)

@@ -6,8 +6,7 @@ from typing import Any
 from fastapi import APIRouter, Request
 from fastapi.responses import Response
 
-from service.lists import Part
-from service.queries import (
+from service.answers import (
     degradation,
     diagnoses,
     fleet_priors,
@@ -18,34 +17,37 @@ from service.queries import (
     series,
     stribeck,
 )
-from service.schemas.life import Method
-from service.schemas.over_life import LoopItem, SeriesItem
-from service.schemas.parameters import DiagnosisId, LifeNumber, Quantity, State, TrackedQuantity
-from service.web import answers
-from service.web.answers import Table
+from service.api.life import Method
+from service.api.over_life import LoopItem, SeriesItem
+from service.api.parameters import DiagnosisId, LifeNumber, Quantity, State, TrackedQuantity
+from service.paging import Part
+from service.web import responses
 from service.web.auth import Reader
 from service.web.context import AtCycles, Prefer, PressureBar
 from service.web.problems import READING
+from service.web.responses import ExportedTable
 from storage.engine.database import Database
 
 router = APIRouter(prefix="/v1/clutches/{clutch_id}", tags=["spreadsheets"], responses=READING)
 fleet_router = APIRouter(prefix="/v1/fleet", tags=["spreadsheets"], responses=READING)
 
-_RUNS, _CHANGES = Table(runs.rows, runs.COLUMNS), Table(runs.trail_rows, runs.TRAIL_COLUMNS)
-_INSPECTIONS = Table(inspections.rows, inspections.COLUMNS)
-_PLAN = Table(diagnoses.plan_rows, diagnoses.PLAN_COLUMNS)
-_REMAINING = Table(remaining_life.rows, remaining_life.COLUMNS)
-_DEGRADATION = Table(degradation.rows, degradation.COLUMNS)
-_STRIBECK = Table(stribeck.rows, ("run_id", "cycles", "held_runs"))
-_SURFACES = Table(stribeck.surface_rows, ("cycles", "pressure_bar"))
-_SCORES = Table(scores.rows, ("end_of_life_cycles", "cycles"))
-_LOOPS = Table(
+_RUNS, _CHANGES = ExportedTable(runs.rows, runs.COLUMNS), ExportedTable(runs.trail_rows, runs.TRAIL_COLUMNS)
+_INSPECTIONS = ExportedTable(inspections.rows, inspections.COLUMNS)
+_PLAN = ExportedTable(diagnoses.plan_rows, diagnoses.PLAN_COLUMNS)
+_REMAINING = ExportedTable(remaining_life.rows, remaining_life.COLUMNS)
+_DEGRADATION = ExportedTable(degradation.rows, degradation.COLUMNS)
+_STRIBECK = ExportedTable(stribeck.rows, ("run_id", "cycles", "held_runs"))
+_SURFACES = ExportedTable(stribeck.surface_rows, ("cycles", "pressure_bar"))
+_SCORES = ExportedTable(scores.rows, ("end_of_life_cycles", "cycles"))
+_LOOPS = ExportedTable(
     lambda loops: [loop | {"held_runs": loops["held_runs"]} for loop in loops["items"]],
     (*LoopItem.model_fields, "held_runs"),
 )
-_SERIES = Table(lambda series: series["items"], tuple(SeriesItem.model_fields))
-_STAGES = Table(lambda fleet: [*fleet["stages"], {"share_of_life": None} | fleet["overall"]], ("share_of_life",))
-_PRIORS = Table(fleet_priors.rows, fleet_priors.COLUMNS)
+_SERIES = ExportedTable(lambda series: series["items"], tuple(SeriesItem.model_fields))
+_STAGES = ExportedTable(
+    lambda fleet: [*fleet["stages"], {"share_of_life": None} | fleet["overall"]], ("share_of_life",)
+)
+_PRIORS = ExportedTable(fleet_priors.rows, fleet_priors.COLUMNS)
 
 
 def _receipts(database: Database, clutch_id: str, part: Part, state: str | None) -> dict[str, Any]:
@@ -54,34 +56,36 @@ def _receipts(database: Database, clutch_id: str, part: Part, state: str | None)
 
 
 @router.get("/runs.csv", response_class=Response)
-async def list_runs_csv(of: answers.WholeOf, state: State = None) -> Response:
+async def list_runs_csv(of: responses.WholeOf, state: State = None) -> Response:
     """Receipts by cycles as CSV; warnings and fits are counted."""
-    return await answers.clutch_table(of, _receipts, _RUNS, of.part, state)
+    return await responses.clutch_table(of, _receipts, _RUNS, of.part, state)
 
 
 @router.get("/changes.csv", response_class=Response)
-async def list_changes_csv(of: answers.WholeOf) -> Response:
+async def list_changes_csv(of: responses.WholeOf) -> Response:
     """The audit trail as CSV, newest first; what changed is JSON."""
-    return await answers.clutch_table(of, runs.trail, _CHANGES, of.part)
+    return await responses.clutch_table(of, runs.trail, _CHANGES, of.part)
 
 
 @router.get("/inspections.csv", response_class=Response)
-async def list_inspections_csv(of: answers.WholeOf) -> Response:
+async def list_inspections_csv(of: responses.WholeOf) -> Response:
     """Inspections by cycles as CSV; photographs are counted."""
-    return await answers.table(
+    return await responses.table(
         of.request, lambda: _INSPECTIONS.page(inspections.page(of.database, of.clutch_id, of.part))
     )
 
 
 @router.get("/diagnoses/{diagnosis_id}/plan.csv", response_class=Response)
-async def diagnosis_plan_csv(of: answers.WholeOf, diagnosis_id: DiagnosisId) -> Response:
+async def diagnosis_plan_csv(of: responses.WholeOf, diagnosis_id: DiagnosisId) -> Response:
     """The tests that a diagnosis advises as CSV, one row per step."""
-    return await answers.table(of.request, lambda: _PLAN.page(diagnoses.plan(of.database, of.clutch_id, diagnosis_id)))
+    return await responses.table(
+        of.request, lambda: _PLAN.page(diagnoses.plan(of.database, of.clutch_id, diagnosis_id))
+    )
 
 
 @router.get("/remaining-useful-life.csv", response_class=Response)
 async def remaining_useful_life_csv(
-    of: answers.WholeOf,
+    of: responses.WholeOf,
     method: Method = "particle",
     pressure_bar: PressureBar = None,
     at_cycles: AtCycles = None,
@@ -89,12 +93,12 @@ async def remaining_useful_life_csv(
 ) -> Response:
     """Quantiles of remaining and end-of-life cycles, one row each."""
     arguments = (method, pressure_bar, at_cycles)
-    return await answers.computed_table(of, remaining_life.remaining_life, _REMAINING, *arguments, prefer=prefer)
+    return await responses.computed_table(of, remaining_life.remaining_life, _REMAINING, *arguments, prefer=prefer)
 
 
 @router.get("/degradation.csv", response_class=Response)
 async def degradation_csv(
-    of: answers.WholeOf,
+    of: responses.WholeOf,
     method: Method = "grid",
     quantity: TrackedQuantity = None,
     at_cycles: AtCycles = None,
@@ -103,49 +107,49 @@ async def degradation_csv(
 ) -> Response:
     """Coefficients of eq. 6, one row per quantity and pressure."""
     arguments = degradation.arguments(method, quantity, at_cycles, life)
-    return await answers.computed_table(of, degradation.degradation, _DEGRADATION, *arguments, prefer=prefer)
+    return await responses.computed_table(of, degradation.degradation, _DEGRADATION, *arguments, prefer=prefer)
 
 
 @router.get("/stribeck.csv", response_class=Response)
-async def stribeck_csv(of: answers.WholeOf, prefer: Prefer = None) -> Response:
+async def stribeck_csv(of: responses.WholeOf, prefer: Prefer = None) -> Response:
     """The fits, one row per test and pressure; `limit` counts tests."""
-    return await answers.computed_table(of.whole, stribeck.curves, _STRIBECK, of.part, prefer=prefer)
+    return await responses.computed_table(of.whole, stribeck.curves, _STRIBECK, of.part, prefer=prefer)
 
 
 @router.get("/surfaces.csv", response_class=Response)
-async def surfaces_csv(of: answers.WholeOf, prefer: Prefer = None) -> Response:
+async def surfaces_csv(of: responses.WholeOf, prefer: Prefer = None) -> Response:
     """The surfaces, one row per count of cycles, pressure and speed."""
-    return await answers.computed_table(of, stribeck.surface, _SURFACES, prefer=prefer)
+    return await responses.computed_table(of, stribeck.surface, _SURFACES, prefer=prefer)
 
 
 @router.get("/scores.csv", response_class=Response)
-async def clutch_scores_csv(of: answers.WholeOf, method: Method = "particle", prefer: Prefer = None) -> Response:
+async def clutch_scores_csv(of: responses.WholeOf, method: Method = "particle", prefer: Prefer = None) -> Response:
     """The scored predictions, one row each."""
-    return await answers.computed_table(of, scores.scores_of_clutch, _SCORES, method, prefer=prefer)
+    return await responses.computed_table(of, scores.scores_of_clutch, _SCORES, method, prefer=prefer)
 
 
 @router.get("/loops.csv", response_class=Response)
-async def loops_csv(of: answers.WholeOf) -> Response:
+async def loops_csv(of: responses.WholeOf) -> Response:
     """Friction loops, one row each."""
-    return await answers.clutch_table(of, runs.loops, _LOOPS, of.part)
+    return await responses.clutch_table(of, runs.loops, _LOOPS, of.part)
 
 
 @router.get("/series.csv", response_class=Response)
-async def series_csv(of: answers.WholeOf, quantity: Quantity = None) -> Response:
+async def series_csv(of: responses.WholeOf, quantity: Quantity = None) -> Response:
     """The flat rows as CSV."""
-    return await answers.clutch_table(of, series.series, _SERIES, of.part, quantity)
+    return await responses.clutch_table(of, series.series, _SERIES, of.part, quantity)
 
 
 @fleet_router.get("/scores.csv", response_class=Response)
 async def fleet_scores_csv(
-    request: Request, context: Reader, part: answers.WholePaged, method: Method = "particle"
+    request: Request, context: Reader, part: responses.WholePaged, method: Method = "particle"
 ) -> Response:
     """Scores of all predictions, one row per stage of life; the last row has all."""
-    scored = await answers.computed_of_each(request, context, scores.scores_of_clutch, method)
-    return await answers.table(request, lambda: _STAGES.page(scores.scores_of_fleet(scored, method=method), part))
+    scored = await responses.computed_of_each(request, context, scores.scores_of_clutch, method)
+    return await responses.table(request, lambda: _STAGES.page(scores.scores_of_fleet(scored, method=method), part))
 
 
 @fleet_router.get("/priors.csv", response_class=Response)
-async def priors_csv(request: Request, context: Reader, part: answers.WholePaged) -> Response:
+async def priors_csv(request: Request, context: Reader, part: responses.WholePaged) -> Response:
     """The fleet's priors, one row each."""
-    return await answers.table(request, lambda: _PRIORS.page(part.sliced(fleet_priors.newest(context.database))))
+    return await responses.table(request, lambda: _PRIORS.page(part.sliced(fleet_priors.newest(context.database))))

@@ -6,19 +6,19 @@ from fastapi import APIRouter, Request
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import Response, StreamingResponse
 
+from service.answers import inspections
+from service.api.base import MAX_PHOTOGRAPH_BYTES
+from service.api.inspection import InspectionIn, InspectionOut, InspectionPage, MediaType, PhotographOut
+from service.api.parameters import ClutchId, InspectionId, PhotographId
+from service.api.run import Withdrawal
+from service.changes import inspect_clutch
 from service.errors import TooLargeError, UnsupportedMediaTypeError
-from service.queries import inspections
-from service.schemas.base import MAX_PHOTOGRAPH_BYTES
-from service.schemas.inspection import InspectionIn, InspectionOut, InspectionPage, MediaType, PhotographOut
-from service.schemas.parameters import ClutchId, InspectionId, PhotographId
-from service.schemas.run import Withdrawal
-from service.web import answers
+from service.web import responses
 from service.web.auth import Ingester, Reader, grant_of
 from service.web.bodies import Takes, takes
 from service.web.files import PACKED
 from service.web.limits import PIECE_BYTES
 from service.web.problems import CHANGING, READING, SENDING
-from service.workflows import inspect_clutch
 from storage.runs import ACCEPTED, WITHDRAWN
 
 router = APIRouter(prefix="/v1/clutches/{clutch_id}/inspections", tags=["inspections"])
@@ -53,7 +53,7 @@ EXAMPLE = {
 @router.post(
     "",
     status_code=201,
-    **answers.taking(
+    **responses.taking(
         InspectionIn,
         InspectionOut,
         EXAMPLE,
@@ -63,38 +63,38 @@ EXAMPLE = {
 )
 async def post_inspection(request: Request, context: Ingester, clutch_id: ClutchId) -> Response:
     """Post an inspection of the friction surface: roughness R_a, skewness R_sk, a note."""
-    sent = await answers.sent(request, InspectionIn)
+    sent = await responses.sent(request, InspectionIn)
     store = partial(inspect_clutch.inspect, context.database, clutch_id, sent)
-    inspection, new = await run_in_threadpool(store, by=grant_of(request).name, at=answers.now())
+    inspection, new = await run_in_threadpool(store, by=grant_of(request).name, at=responses.now())
     address = f"/v1/clutches/{clutch_id}/inspections/{inspection['inspection_id']}"
-    return answers.json_answer(inspection, 201 if new else 200, Location=address)
+    return responses.json_answer(inspection, 201 if new else 200, Location=address)
 
 
 @router.get("", response_model=InspectionPage, responses=READING)
-async def list_inspections(of: answers.PageOf) -> Response:
+async def list_inspections(of: responses.PageOf) -> Response:
     """Inspections by cycles."""
-    return await answers.answer(of.request, inspections.page, of.database, of.clutch_id, of.part)
+    return await responses.answer(of.request, inspections.page, of.database, of.clutch_id, of.part)
 
 
 @router.get("/{inspection_id}", response_model=InspectionOut, responses=READING)
-async def read_inspection(of: answers.Of, inspection_id: InspectionId) -> Response:
+async def read_inspection(of: responses.Of, inspection_id: InspectionId) -> Response:
     """One inspection."""
-    return await answers.answer(of.request, inspections.look_up, of.database, of.clutch_id, inspection_id)
+    return await responses.answer(of.request, inspections.look_up, of.database, of.clutch_id, inspection_id)
 
 
 @router.post(
     "/{inspection_id}/withdraw",
-    **answers.taking(Withdrawal, InspectionOut, {"reason": "it was the disc of the bench beside it"}),
+    **responses.taking(Withdrawal, InspectionOut, {"reason": "it was the disc of the bench beside it"}),
 )
-async def withdraw_inspection(of: answers.ChangeOf, inspection_id: InspectionId) -> Response:
+async def withdraw_inspection(of: responses.ChangeOf, inspection_id: InspectionId) -> Response:
     """Withdraw an inspection. It stays stored and listed, with its photographs."""
     return await _changed(WITHDRAWN, of, inspection_id)
 
 
 @router.post(
-    "/{inspection_id}/restore", **answers.taking(Withdrawal, InspectionOut, {"reason": "it was this disc after all"})
+    "/{inspection_id}/restore", **responses.taking(Withdrawal, InspectionOut, {"reason": "it was this disc after all"})
 )
-async def restore_inspection(of: answers.ChangeOf, inspection_id: InspectionId) -> Response:
+async def restore_inspection(of: responses.ChangeOf, inspection_id: InspectionId) -> Response:
     """Undo a withdrawal."""
     return await _changed(ACCEPTED, of, inspection_id)
 
@@ -113,9 +113,9 @@ async def post_photograph(
     """Add a photograph to an inspection: the file itself as the body, PNG, JPEG or WebP, 16 MiB at most."""
     media_type = _media_type(request)
     add = partial(inspect_clutch.add_photograph, context.database, clutch_id, inspection_id, await _file(request))
-    photograph, new = await run_in_threadpool(add, media_type, by=grant_of(request).name, at=answers.now())
+    photograph, new = await run_in_threadpool(add, media_type, by=grant_of(request).name, at=responses.now())
     address = f"/v1/clutches/{clutch_id}/inspections/{inspection_id}/photographs/{photograph['photograph_id']}"
-    return answers.json_answer(photograph, 201 if new else 200, Location=address)
+    return responses.json_answer(photograph, 201 if new else 200, Location=address)
 
 
 @router.get("/{inspection_id}/photographs/{photograph_id}", response_class=Response, responses=_READING_FILE)
@@ -127,7 +127,7 @@ async def read_photograph(
         inspections.photograph, context.database, clutch_id, inspection_id, photograph_id
     )
     headers = _OF_A_FILE | {"ETag": f'"{photograph_id}"'}
-    if held := answers.unchanged(request, headers):
+    if held := responses.unchanged(request, headers):
         return held
     headers |= PACKED | {"Content-Length": str(photograph.row.bytes)}
     return StreamingResponse(photograph.pieces(PIECE_BYTES), media_type=photograph.row.media_type, headers=headers)
@@ -151,8 +151,8 @@ async def _file(request: Request) -> bytes:
     return bytes(content)
 
 
-async def _changed(state: str, of: answers.OfClutch, inspection_id: str) -> Response:
+async def _changed(state: str, of: responses.OfClutch, inspection_id: str) -> Response:
     """The inspection in its new state."""
-    reason, by = (await answers.sent(of.request, Withdrawal)).reason, grant_of(of.request).name
-    change = partial(inspect_clutch.change, reason=reason, by=by, at=answers.now())
-    return answers.json_answer(await run_in_threadpool(change, of.database, of.clutch_id, inspection_id, state))
+    reason, by = (await responses.sent(of.request, Withdrawal)).reason, grant_of(of.request).name
+    change = partial(inspect_clutch.change, reason=reason, by=by, at=responses.now())
+    return responses.json_answer(await run_in_threadpool(change, of.database, of.clutch_id, inspection_id, state))

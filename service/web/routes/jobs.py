@@ -7,14 +7,14 @@ from fastapi import APIRouter, Header, Request
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import Response
 
+from service.answers import jobs
+from service.api.diagnosis import JobIn, JobOut, JobPage
+from service.api.parameters import JobId, OfState
+from service.changes import ask_job
 from service.logging import request_id
-from service.queries import jobs
-from service.schemas.diagnosis import JobIn, JobOut, JobPage
-from service.schemas.parameters import JobId, OfState
-from service.web.answers import Paged, answer, json_answer, now, preferred_wait, sent, taking, until_ended
 from service.web.auth import OwnAdmin, OwnReader, grant_of, require_clutch
 from service.web.problems import READING, SENDING
-from service.workflows import ask_job
+from service.web.responses import Paged, answer, json_answer, now, preferred_wait, sent, taking, until_ended
 from storage.jobs import OPEN
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"])

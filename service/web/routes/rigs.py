@@ -8,20 +8,20 @@ from fastapi import APIRouter, Request
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import Response
 
+from service.answers import rigs
+from service.api import parameters
+from service.api.rig import Preview, RigIn, RigOut, RigPage
+from service.changes.save_rig import save
 from service.errors import InvalidError
-from service.queries import rigs
+from service.jobs.workers import Lane
 from service.readers.read_file import reading_of
-from service.run_files.rig_profile import require_usable
-from service.schemas import parameters
-from service.schemas.rig import Preview, RigIn, RigOut, RigPage
-from service.web.answers import Paged, answer, json_answer, now, sent, taking
+from service.runs.rig_profile import require_usable
 from service.web.auth import Admin, Ingester, OwnIngester, OwnReader, grant_of, require_clutch
 from service.web.bodies import Takes, takes
 from service.web.context import Context
 from service.web.files import FILE_BODY, received, temporary_folder
 from service.web.problems import CHANGING, READING, SENDING
-from service.work.workers import Lane
-from service.workflows.save_rig import save
+from service.web.responses import Paged, answer, json_answer, now, sent, taking
 
 router = APIRouter(prefix="/v1/rigs", tags=["rigs"])
 import_router = APIRouter(prefix="/v1/import", tags=["rigs"])

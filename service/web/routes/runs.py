@@ -14,24 +14,24 @@ from fastapi import APIRouter, Request
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import Response
 
+from service.answers import rigs, runs
+from service.answers.raw_run import Kind, copy_file, entity_tag, file_sha256, write_run
+from service.api import parameters
+from service.api.base import Origin
+from service.api.run import RUN_IN, Confirmation, Confirmations, Correction, Receipt, RunOut, RunPage, Withdrawal
+from service.changes import change_run
+from service.changes.ingest_run import ingest_posted
 from service.errors import NoRoomError, NotAcceptableError, NotFoundError
-from service.queries import rigs, runs
-from service.queries.raw_run import Kind, copy_file, entity_tag, file_sha256, write_run
+from service.jobs.workers import Lane
 from service.readers.read_file import reading_of
-from service.run_files.json_run import read_run, read_run_on_disk
-from service.run_files.upload import read_file_run
-from service.schemas import parameters
-from service.schemas.base import Origin
-from service.schemas.run import RUN_IN, Confirmation, Confirmations, Correction, Receipt, RunOut, RunPage, Withdrawal
-from service.web import answers, files
+from service.runs.json_run import read_run, read_run_on_disk
+from service.runs.upload import read_file_run
+from service.web import files, responses
 from service.web.auth import Ingester, Reader, grant_of
 from service.web.bodies import Takes, takes
 from service.web.context import Context
 from service.web.limits import LARGE_BODY_BYTES
 from service.web.problems import READING, SENDING, described
-from service.work.workers import Lane
-from service.workflows import change_run
-from service.workflows.ingest_run import ingest_posted
 from storage import changes
 
 router = APIRouter(prefix="/v1/clutches/{clutch_id}/runs", tags=["runs"])
@@ -88,9 +88,9 @@ async def post_run_file(
         )
         by = grant_of(request).name
         # without a turn: a file that takes long to read would have the clutch's other runs wait
-        taken_in = context.workers.submit(Lane.FILES, ingest_posted, clutch_id, read, answers.now(), by, path)
+        taken_in = context.workers.submit(Lane.FILES, ingest_posted, clutch_id, read, responses.now(), by, path)
         receipt, new = await asyncio.wrap_future(taken_in)
-    return answers.json_answer(
+    return responses.json_answer(
         receipt, 201 if new else 200, Location=f"/v1/clutches/{clutch_id}/runs/{receipt['run_id']}"
     )
 
@@ -99,11 +99,11 @@ _READING_FILE = READING | {200: {"content": files.FILE_CONTENT, "description": "
 
 
 @router.get("/{run_id}/file", response_class=Response, responses=_READING_FILE)
-async def read_run_file(of: answers.Of, run_id: parameters.RunId) -> Response:
+async def read_run_file(of: responses.Of, run_id: parameters.RunId) -> Response:
     """The file that a run was read from, as it was sent."""
     sha256 = await run_in_threadpool(file_sha256, of.database, of.clutch_id, run_id)
     headers = {"Cache-Control": "no-cache", "ETag": f'"{sha256}"', "Content-Disposition": "attachment"}
-    if held := answers.unchanged(of.request, headers):
+    if held := responses.unchanged(of.request, headers):
         return held
     copy = await _copy(of.request, of.context, headers["ETag"], copy_file, of.clutch_id, run_id)
     return copy.answer(files.FILE_TYPE, headers)
@@ -143,14 +143,14 @@ EXAMPLE = {
 @router.post(
     "",
     status_code=201,
-    **answers.taking(
+    **responses.taking(
         RUN_IN.json_schema(), Receipt, EXAMPLE, SENDING, {200: "The run was stored before; the answer is its receipt"}
     ),
 )
 @takes(Takes.RUN)
 async def post_run(request: Request, context: Ingester, clutch_id: parameters.ClutchId) -> Response:
     """Post a run, in any order of cycles. The receipt has the results. When you get it, the run is stored for good."""
-    answers.require_json(request)
+    responses.require_json(request)
     by = grant_of(request).name
     async with files.body_or_file(request, context.folder) as body:
         is_short = isinstance(body, bytes) and len(body) <= LARGE_BODY_BYTES
@@ -159,19 +159,19 @@ async def post_run(request: Request, context: Ingester, clutch_id: parameters.Cl
             ingest_posted,
             clutch_id,
             partial(read_run, body) if isinstance(body, bytes) else partial(read_run_on_disk, body),
-            answers.now(),
+            responses.now(),
             by,
             turn=clutch_id,
         )
         receipt, new = await asyncio.wrap_future(taken_in)
     address = f"/v1/clutches/{clutch_id}/runs/{receipt['run_id']}"
-    return answers.json_answer(receipt, 201 if new else 200, Location=address)
+    return responses.json_answer(receipt, 201 if new else 200, Location=address)
 
 
 @router.get("", response_model=RunPage, responses=READING)
-async def list_runs(of: answers.PageOf, state: parameters.State = None, kind: parameters.RunKind = None) -> Response:
+async def list_runs(of: responses.PageOf, state: parameters.State = None, kind: parameters.RunKind = None) -> Response:
     """Receipts by cycles."""
-    return await answers.clutch_answer(of, runs.page_as_json, of.part, state, kind)
+    return await responses.clutch_answer(of, runs.page_as_json, of.part, state, kind)
 
 
 @router.get("/{run_id}", response_model=RunOut, responses=READING_RUN)
@@ -183,7 +183,7 @@ async def read_run_with_channels(
     points: parameters.Points = None,
 ) -> Response:
     """One receipt with the run's channels: as sent, or thinned for a plot, or as Parquet if `Accept` prefers it."""
-    media_type = files.preferred(request, (answers.JSON_TYPE, files.PARQUET_TYPE))
+    media_type = files.preferred(request, (responses.JSON_TYPE, files.PARQUET_TYPE))
     kind: Kind = "parquet" if media_type == files.PARQUET_TYPE else "json"
     packed = kind == "json" and points is not None and "gzip" in request.headers.get("accept-encoding", "")
     headers = {"Cache-Control": "no-cache", "Vary": "Accept, Accept-Encoding"}
@@ -191,7 +191,7 @@ async def read_run_with_channels(
     headers["ETag"] = await run_in_threadpool(
         entity_tag, context.database, clutch_id, run_id, points=points, kind=kind, compressed=packed
     )
-    if held := answers.unchanged(request, headers):
+    if held := responses.unchanged(request, headers):
         return held
     write = partial(write_run, points=points, kind=kind, compressed=packed)
     copy = await _copy(request, context, headers["ETag"], write, clutch_id, run_id)
@@ -199,63 +199,65 @@ async def read_run_with_channels(
     return copy.answer(media_type, headers | (files.PACKED if kind == "parquet" else {}))
 
 
-@router.patch("/{run_id}", **answers.taking(Correction, Receipt, {"cycles": 7000, "reason": "typed a zero too many"}))
-async def correct_run(of: answers.ChangeOf, run_id: parameters.RunId) -> Response:
+@router.patch("/{run_id}", **responses.taking(Correction, Receipt, {"cycles": 7000, "reason": "typed a zero too many"}))
+async def correct_run(of: responses.ChangeOf, run_id: parameters.RunId) -> Response:
     """Correct a run's cycles, or read its file again with a rig profile. If it is plausible then, it counts. What was
     sent stays stored.
     """
-    correction = await answers.sent(of.request, Correction)
+    correction = await responses.sent(of.request, Correction)
     if correction.rig is not None:
-        by, at = grant_of(of.request).name, answers.now()
+        by, at = grant_of(of.request).name, responses.now()
         reread = partial(change_run.read_again, rig=correction.rig, reason=correction.reason, by=by, at=at)
-        return answers.json_answer(await answers.changed(of, reread, run_id, of.context.folder))
+        return responses.json_answer(await responses.changed(of, reread, run_id, of.context.folder))
     return await _changed(of, changes.CORRECT, run_id, correction, cycles=correction.cycles)
 
 
-@router.post("/{run_id}/withdraw", **answers.taking(Withdrawal, Receipt, {"reason": "the torque sensor was unplugged"}))
-async def withdraw_run(of: answers.ChangeOf, run_id: parameters.RunId) -> Response:
+@router.post(
+    "/{run_id}/withdraw", **responses.taking(Withdrawal, Receipt, {"reason": "the torque sensor was unplugged"})
+)
+async def withdraw_run(of: responses.ChangeOf, run_id: parameters.RunId) -> Response:
     """Withdraw a run: it no longer counts, but stays stored and listed."""
-    return await _changed(of, changes.WITHDRAW, run_id, await answers.sent(of.request, Withdrawal))
+    return await _changed(of, changes.WITHDRAW, run_id, await responses.sent(of.request, Withdrawal))
 
 
-@router.post("/{run_id}/restore", **answers.taking(Withdrawal, Receipt, {"reason": "it was the other sensor"}))
-async def restore_run(of: answers.ChangeOf, run_id: parameters.RunId) -> Response:
+@router.post("/{run_id}/restore", **responses.taking(Withdrawal, Receipt, {"reason": "it was the other sensor"}))
+async def restore_run(of: responses.ChangeOf, run_id: parameters.RunId) -> Response:
     """Undo a withdrawal: the run is accepted or held again, as before."""
-    return await _changed(of, changes.RESTORE, run_id, await answers.sent(of.request, Withdrawal))
+    return await _changed(of, changes.RESTORE, run_id, await responses.sent(of.request, Withdrawal))
 
 
 @router.post(
     "/confirm",
-    **answers.taking(
+    **responses.taking(
         Confirmations, RunPage, {"run_ids": ["test-7000", "test-8000"], "reason": "the clutch was run over the weekend"}
     ),
 )
-async def confirm_runs(of: answers.ChangeOf) -> Response:
+async def confirm_runs(of: responses.ChangeOf) -> Response:
     """Accept several held runs as they were sent, in one step. If one does not exist, none is accepted. Runs that are
     not held stay unchanged.
     """
-    confirmations = await answers.sent(of.request, Confirmations)
+    confirmations = await responses.sent(of.request, Confirmations)
     return await _changed(of, changes.CONFIRM, confirmations.run_ids, confirmations)
 
 
 @router.post(
-    "/{run_id}/confirm", **answers.taking(Confirmation, Receipt, {"reason": "the clutch was run over the weekend"})
+    "/{run_id}/confirm", **responses.taking(Confirmation, Receipt, {"reason": "the clutch was run over the weekend"})
 )
-async def confirm_run(of: answers.ChangeOf, run_id: parameters.RunId) -> Response:
+async def confirm_run(of: responses.ChangeOf, run_id: parameters.RunId) -> Response:
     """Accept a held run as it was sent."""
-    return await _changed(of, changes.CONFIRM, run_id, await answers.sent(of.request, Confirmation))
+    return await _changed(of, changes.CONFIRM, run_id, await responses.sent(of.request, Confirmation))
 
 
 async def _changed(
-    of: answers.OfClutch,
+    of: responses.OfClutch,
     action: str,
     run_id: str | Sequence[str],
     sent: Correction | Withdrawal | Confirmation | Confirmations,
     **more: Any,
 ) -> Response:
     """The receipt after a change, or a list of them where it is of a list of runs."""
-    by, reason, at = grant_of(of.request).name, sent.reason, answers.now()
+    by, reason, at = grant_of(of.request).name, sent.reason, responses.now()
     edit = partial(change_run.change, action=action, reason=reason, by=by, at=at, **more)
     if isinstance(run_id, str):
-        return answers.json_answer((await answers.changed(of, edit, [run_id]))[0])
-    return answers.json_answer({"items": await answers.changed(of, edit, run_id), "next": None})
+        return responses.json_answer((await responses.changed(of, edit, [run_id]))[0])
+    return responses.json_answer({"items": await responses.changed(of, edit, run_id), "next": None})

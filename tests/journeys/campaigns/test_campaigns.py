@@ -9,7 +9,7 @@ import httpx2
 import pytest
 
 from models.rig import campaign
-from service.run_files.simulated import simulated_body
+from service.runs.simulated import simulated_body
 from tests.support import Server, clutchlife, stationary
 
 # --- Simulated campaigns go through the whole way in text and in a binary format: simulate, push, receipts.

@@ -7,7 +7,7 @@ from pathlib import Path
 import httpx2
 import pytest
 
-from tests.service.work.replaying import ended, processes, until_none
+from tests.service.jobs.replaying import ended, processes, until_none
 from tests.support import Server, clutchlife, post_tests, serving
 
 BASE = "/v1/clutches/c1"

@@ -9,7 +9,7 @@ from playwright.sync_api import Browser, Page, expect
 
 from tests.browser.driving import Watched, pointed_at, turned
 from tests.browser.lives import post, worn
-from tests.service.workflows import stand_in_engine
+from tests.service.changes import stand_in_engine
 from tests.support import serving, stationary
 
 pytestmark = pytest.mark.browser

@@ -14,7 +14,7 @@ from playwright.sync_api import Locator, Page, expect
 
 from tests.browser.driving import Watched, drop, turned
 from tests.browser.lives import loops, post
-from tests.service.workflows.benches import without_held
+from tests.service.changes.benches import without_held
 from tests.support import Server, filled_service, stationary
 
 pytestmark = pytest.mark.browser

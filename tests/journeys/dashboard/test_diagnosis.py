@@ -12,7 +12,7 @@ from tests.support import Server, filled_service, stationary
 
 pytestmark = pytest.mark.browser
 
-ENGINE = "tests.service.workflows.stand_in_engine:diagnose"
+ENGINE = "tests.service.changes.stand_in_engine:diagnose"
 
 
 @filled_service(scope="function", engine=ENGINE)

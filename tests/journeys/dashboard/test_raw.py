@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from storage import channels, runs
+from storage import raw_columns, runs
 from storage.engine.opening import open_database
 from tests.browser.driving import Watched, Wire, pointed_at
 from tests.browser.lives import loops, post
@@ -61,7 +61,7 @@ def life(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
             connection.exec_driver_sql("DELETE FROM channel")
             for row in runs.in_order(connection, "bench"):
                 columns = record(row.cycles, rng, swept=row.kind == "dynamic_stribeck")
-                channels.write(connection, row.run_key, channels.encoded(columns))
+                raw_columns.write(connection, row.run_key, raw_columns.encoded(columns))
         database.close()
         yield server
 

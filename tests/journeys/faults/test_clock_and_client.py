@@ -11,12 +11,12 @@ from typing import Any
 
 import pytest
 
-from service.lives.plausibility.doubts import Judged
+from service.clutch.plausibility.doubts import Judged
 from tests.journeys.faults.test_kills import bits, findings, kills, numbered, stored
+from tests.service.changes.benches import CLUTCH, body
 from tests.service.clients import client_on
+from tests.service.jobs.waiting import until
 from tests.service.web.routes.granting import granted, revoke_all
-from tests.service.work.waiting import until
-from tests.service.workflows.benches import CLUTCH, body
 from tests.support import serving
 
 HOUR, DAY = timedelta(hours=1), timedelta(days=1)
@@ -55,11 +55,11 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> type[Clock]:
         for name, module in sys.modules.items()
         if name.partition(".")[0] in ("service", "storage") and getattr(module, "datetime", None) is datetime
     ]
-    assert {"service.web.answers", "service.web.auth"} <= {module.__name__ for module in readers}
+    assert {"service.web.responses", "service.web.auth"} <= {module.__name__ for module in readers}
     for module in readers:
         monkeypatch.setattr(module, "datetime", Clock)
-    for workflow in ("ingest_run", "change_run"):
-        monkeypatch.setattr(f"service.workflows.{workflow}.doubts_together", lambda *_, **__: Judged())
+    for change in ("ingest_run", "change_run"):
+        monkeypatch.setattr(f"service.changes.{change}.doubts_together", lambda *_, **__: Judged())
     monkeypatch.setattr(Clock, "off", timedelta())
     return Clock
 

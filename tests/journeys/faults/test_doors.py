@@ -19,13 +19,13 @@ from typing import Any
 import httpx2
 import pytest
 
-from service.schemas.base import MAX_POINTS
+from service.api.base import MAX_POINTS
 from service.web.limits import TAKEN_SECONDS
 from tests.benchmarks.memory import resident
 from tests.load.bodies import long_file
 from tests.service.alarms.receiving import SECRET, receiving
+from tests.service.jobs.waiting import until
 from tests.service.web.routes.surfaces import png
-from tests.service.work.waiting import until
 from tests.support import Server, post_tests, serving, stationary
 
 pytestmark = pytest.mark.slow

@@ -20,10 +20,10 @@ import httpx2
 import numpy as np
 import pytest
 
+from service.answers.verification import check_results, check_runs
+from service.changes.adopt_model import adopt
 from service.client.clutchlife import Client, ServiceAwayError
-from service.queries.verification import check_results, check_runs
-from service.workflows.adopt_model import adopt
-from storage import assumptions, channels, clutches, jobs, runs
+from storage import assumptions, clutches, jobs, raw_columns, runs
 from storage.engine.database import Database
 from storage.engine.integrity import other_schema
 from storage.engine.opening import find_database, open_database
@@ -31,10 +31,10 @@ from storage.engine.sqlite.backup import restore
 from storage.engine.sqlite.database import back_up
 from storage.migrations.upgrade import head
 from tests.service.alarms.receiving import SECRET, Receiver, receiving
-from tests.service.work.replaying import ended
-from tests.service.work.waiting import until
-from tests.service.workflows import stand_in_engine
-from tests.service.workflows.benches import Bench, body, stood_in
+from tests.service.changes import stand_in_engine
+from tests.service.changes.benches import Bench, body, stood_in
+from tests.service.jobs.replaying import ended
+from tests.service.jobs.waiting import until
 from tests.storage.engine.postgresql.server import PostgresServer, postgresql_server
 from tests.storage.samples import OLD, integrity, old_database, read_from, reseal, revision
 from tests.support import ONCE, Server, one_quick, serving, stationary
@@ -116,7 +116,7 @@ def stored(path: Path | str) -> Acknowledged:
     with closing(find_database(address_of(path))) as database, database.reading() as connection:
         for name in clutches.all_ids(connection):
             for row in runs.page(connection, name):
-                columns = channels.values_of(channels.stored_of_run(connection, row.run_key))
+                columns = raw_columns.values_of(raw_columns.stored_of_run(connection, row.run_key))
                 content[name, row.run_id] = {channel: column.tobytes() for channel, column in columns.items()}
     return content
 

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from models.degradation.general_order import (
-    Degradation,
+    DegradationLaw,
     first_passage,
     progress_fraction,
     reaches,
@@ -22,11 +22,11 @@ changes = st.floats(-2.0, 2.0).filter(lambda change: abs(change) > 1e-3)
 
 def test_eq_6_by_hand() -> None:
     """(1 + 15000/5000)^-0.5 = 4^-0.5 = 1/2."""
-    d = Degradation(initial=0.13, change=-0.1, scale=5_000.0, exponent=0.5)
+    d = DegradationLaw(initial=0.13, change=-0.1, scale=5_000.0, exponent=0.5)
     assert value(15_000.0, d) == pytest.approx(0.08, rel=1e-15)
     assert first_passage(0.08, d) == pytest.approx(15_000.0, rel=1e-12)
     # passages broadcast and overflow to infinity without a warning
-    d = Degradation(initial=1.0, change=np.array([-0.4, -0.6, -0.5 - 1e-15]), scale=1e5, exponent=0.01)
+    d = DegradationLaw(initial=1.0, change=np.array([-0.4, -0.6, -0.5 - 1e-15]), scale=1e5, exponent=0.01)
     assert first_passage(0.5, d).tolist()[0] == math.inf
     assert np.isinf(first_passage(0.5, d)[2])
     # At ζ/φ = 1e-12 the series ε x (1 - (1 + ε) x/2) is exact to rounding; 1 - (1 + x)^-ε keeps four digits.
@@ -38,7 +38,7 @@ def test_eq_6_by_hand() -> None:
 
 @given(st.floats(-5.0, 5.0), changes, scales, exponents)
 def test_at_zero_nothing_has_happened(initial: float, change: float, scale: float, exponent: float) -> None:
-    d = Degradation(initial=initial, change=change, scale=scale, exponent=exponent)
+    d = DegradationLaw(initial=initial, change=change, scale=scale, exponent=exponent)
     assert value(0.0, d) == initial
     assert first_passage(initial, d) == 0.0
 
@@ -50,7 +50,7 @@ def test_inverse_round_trip(change: float, scale: float, exponent: float, share:
 
     Rounding of level - ξ0 by 1e-16 |ξ0| bounds the error.
     """
-    d = Degradation(initial=0.13, change=change, scale=scale, exponent=exponent)
+    d = DegradationLaw(initial=0.13, change=change, scale=scale, exponent=exponent)
     level = 0.13 + share * change
     zeta = first_passage(level, d)
     assert reaches(level, d)
@@ -62,7 +62,7 @@ def test_inverse_round_trip(change: float, scale: float, exponent: float, share:
     ("level", "change"), [(0.05, -0.06), (0.07, -0.06), (0.14, -0.06), (0.1, 0.06), (0.1, 0.0), (0.2, 0.06)]
 )
 def test_a_level_outside_the_range_is_never_passed(level: float, change: float) -> None:
-    d = Degradation(initial=0.13, change=change, scale=4_000.0, exponent=0.8)
+    d = DegradationLaw(initial=0.13, change=change, scale=4_000.0, exponent=0.8)
     assert not reaches(level, d)
     assert first_passage(level, d) == math.inf
 
@@ -90,7 +90,7 @@ def test_each_course_is_kinetics_of_its_order_and_passes_a_level_where_it_has_th
     np.testing.assert_allclose(rate, expected, rtol=1e-5)
     assert np.abs(rate / first_order - 1.0).max() > 0.1  # the control
     # the first passage is where the course has that value
-    degradation = Degradation(initial=0.13, change=-0.1, scale=scale, exponent=exponent)
+    degradation = DegradationLaw(initial=0.13, change=-0.1, scale=scale, exponent=exponent)
     for zeta in (1.0, 500.0, 8_500.0):
         assert first_passage(float(value(zeta, degradation)), degradation) == pytest.approx(zeta, rel=1e-9)
     assert first_passage(0.2, degradation) == math.inf
@@ -107,4 +107,4 @@ def test_each_course_is_kinetics_of_its_order_and_passes_a_level_where_it_has_th
 def test_coefficients_check_themselves(name: str, number: float, message: str) -> None:
     coefficients = {"initial": 1.0, "change": -0.5, "scale": 10.0, "exponent": 1.0} | {name: number}
     with pytest.raises(ValueError, match=message):
-        Degradation(**coefficients)
+        DegradationLaw(**coefficients)

@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from models.degradation.general_order import Degradation, first_passage, value
+from models.degradation.general_order import DegradationLaw, first_passage, value
 from models.degradation.severity import (
     IDENTITY,
     Block,
-    Programme,
+    DutyProgramme,
     Severity,
     SeverityBasis,
     severity_map,
@@ -95,7 +95,7 @@ def test_a_life_of_light_and_heavy_blocks_is_predicted_better_by_energy() -> Non
     for seed in range(6):
         rng = np.random.default_rng(seed)
         energies: list[float | None] = [40e3 if (i // 4 + seed) % 2 else 10e3 for i in range(40)]
-        truth = Degradation(initial=0.13, change=-0.1, scale=20_000.0 * rng.uniform(0.8, 1.25), exponent=1.0)
+        truth = DegradationLaw(initial=0.13, change=-0.1, scale=20_000.0 * rng.uniform(0.8, 1.25), exponent=1.0)
         true_map = severity_map(ENERGY, blocks(energies))
         end = float(true_map.cycles_at(first_passage(0.065, truth)))
         last = int(0.6 * end // 1000)
@@ -115,9 +115,9 @@ def test_a_life_of_light_and_heavy_blocks_is_predicted_better_by_energy() -> Non
 BLOCKS = st.lists(st.tuples(st.integers(1, 40), st.floats(0.05, 20.0)), min_size=1, max_size=5)
 
 
-def programme(blocks: list[tuple[int, float]]) -> Programme:
+def programme(blocks: list[tuple[int, float]]) -> DutyProgramme:
     lengths, rates = zip(*blocks, strict=True)
-    return Programme(cycles=np.array(lengths, dtype=float), rates=np.array([rates]))
+    return DutyProgramme(cycles=np.array(lengths, dtype=float), rates=np.array([rates]))
 
 
 @given(BLOCKS, st.floats(0.0, 3_000.0))
@@ -133,7 +133,7 @@ def test_it_takes_the_cycles_that_a_walk_takes(blocks: list[tuple[int, float]], 
 
 
 def test_each_draw_goes_its_own_pace_and_never_is_never() -> None:
-    two = Programme(cycles=np.array([100.0, 50.0]), rates=np.array([[1.0, 4.0], [2.0, 1.0], [1.0, 1.0]]))
+    two = DutyProgramme(cycles=np.array([100.0, 50.0]), rates=np.array([[1.0, 4.0], [2.0, 1.0], [1.0, 1.0]]))
     found = two.cycles_until(np.array([700.0, 225.0, np.inf]))
     assert found.tolist() == [400.0, 125.0, np.inf]
     assert [two.blocks_in(cycles) for cycles in (0.0, 50.0, 125.0, 150.0, 400.0)] == [0.0, 0.5, 1.5, 2.0, 5.0]
@@ -151,4 +151,4 @@ def test_uncertain_work_has_the_mean_and_deviation_that_are_planned() -> None:
 @pytest.mark.parametrize(("cycles", "rates"), [([], [[]]), ([0.0], [[1.0]]), ([5.0], [[0.0]]), ([5.0], [[-1.0]])])
 def test_a_programme_that_leads_nowhere_is_refused(cycles: list[float], rates: list[list[float]]) -> None:
     with pytest.raises(ValueError, match="programme"):
-        Programme(cycles=np.array(cycles), rates=np.array(rates))
+        DutyProgramme(cycles=np.array(cycles), rates=np.array(rates))

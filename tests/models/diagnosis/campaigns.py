@@ -29,7 +29,7 @@ from models.loops.lag_laws import attractor_torque
 from models.records.runs import Plateaus, Record
 from models.rig import campaign as rig
 from models.rig.hidden import clutch_for, hidden_in
-from models.rig.programme import Programme
+from models.rig.programme import RigProgramme
 from models.rig.sampled import DynamicTest
 from models.rig.simulated_runs import SimulatedRun
 from models.rig.stationary import SHARP
@@ -164,7 +164,7 @@ def rehearsal(
     sizes = hidden or {}
     clutch = clutch_for(rig.simulated_clutch(seed), sizes)
     sensor = SHARP if noise is None else replace(SHARP, noise=noise)
-    programme = Programme(dynamic=DynamicTest() if dynamic else None, engagements=True)
+    programme = RigProgramme(dynamic=DynamicTest() if dynamic else None, engagements=True)
     runs = rig.simulate(seed, clutch=clutch, sensor=sensor, programme=programme, most_tests=tests)
     return campaign_of(hidden_in(run, clutch, sizes) for run in runs)
 

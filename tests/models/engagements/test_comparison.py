@@ -7,10 +7,10 @@ import pytest
 
 from models.clutch import Geometry
 from models.engagements.comparison import SpeedCourse, compared, reference_of, same_duty
-from models.engagements.discrepancy import Discrepancy, discrepancy
-from models.engagements.measured import MeasuredEngagement, measured_engagement
+from models.engagements.discrepancy import EngagementDiscrepancy, discrepancy
+from models.engagements.measured import EngagementIndicators, measured_engagement
 from models.engagements.simulation import Capacity, engage
-from models.engagements.slip import Estimate
+from models.engagements.slip import ValueWithError
 from models.records.runs import Record
 from models.rig.campaign import simulated_clutch
 from models.rig.sampled import Recorder
@@ -23,7 +23,7 @@ from tests.models.rig.exact import NOISELESS
 def straight(duration: float, points: int = 65) -> SpeedCourse:
     """A speed that falls evenly from 100 rad/s."""
     return SpeedCourse(
-        duration=Estimate(value=duration, sd=0.0), speed=100.0 * np.linspace(1.0, 0.0, points), noise=0.0
+        duration=ValueWithError(value=duration, sd=0.0), speed=100.0 * np.linspace(1.0, 0.0, points), noise=0.0
     )
 
 
@@ -75,9 +75,9 @@ def coulomb(cof: float) -> Capacity:
     return lambda pressure, _velocity: cof * PER_PASCAL * pressure
 
 
-def against(found_record: Record, capacity: Capacity) -> Discrepancy:
+def against(found_record: Record, capacity: Capacity) -> EngagementDiscrepancy:
     engagement = measured_engagement(found_record, GEOMETRY)
-    assert isinstance(engagement, MeasuredEngagement), engagement
+    assert isinstance(engagement, EngagementIndicators), engagement
     return discrepancy(engagement, capacity, GEOMETRY.mean_radius)
 
 

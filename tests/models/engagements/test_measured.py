@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from models.clutch import Geometry
-from models.engagements.measured import MeasuredEngagement, measured_engagement
+from models.engagements.measured import EngagementIndicators, measured_engagement
 from models.engagements.slip import Refusal, SlipStatus
 from models.records.runs import Record
 from tests.models.engagements.closed_forms import CONTACT, EXACT, FORMS, PRESSURE, SPEED, Engagement, Sensors, record
@@ -17,8 +17,8 @@ GEOMETRY = Geometry()
 HARSH = Sensors(torque_zero=1.5, speed_zero=-1.5, lost=0.05, hole=(0.5, 0.6))
 
 
-def measured(found: MeasuredEngagement | Refusal) -> MeasuredEngagement:
-    assert isinstance(found, MeasuredEngagement), found
+def measured(found: EngagementIndicators | Refusal) -> EngagementIndicators:
+    assert isinstance(found, EngagementIndicators), found
     return found
 
 

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import nnls
 
-from models.friction.identification import FitStatus, fit_curves, mean_torques
+from models.friction.identification import StribeckFitStatus, fit_curves, mean_torques
 from models.friction.stribeck import PARAMETER_NAMES, torque
 from models.friction.variable_projection import jacobian, make_problem, minimise, profile
 from tests.models.friction.stribeck_curves import PRESSURES, VELOCITY, clutch, curve, eq3, hard_curve
@@ -31,7 +31,7 @@ def test_noiseless_curves_are_recovered(life):
     fits = fit_curves([curve(VELOCITY, row, bar=p) for row, p in zip(eq3(truth, VELOCITY), PRESSURES, strict=True)])
     np.testing.assert_allclose([fit.parameters.as_array() for fit in fits], truth, rtol=1e-5)
     assert [fit.pressure for fit in fits] == (PRESSURES * 1e5).tolist()
-    assert all(fit.status is FitStatus.DETERMINED and fit.acceptable for fit in fits)
+    assert all(fit.status is StribeckFitStatus.DETERMINED and fit.acceptable for fit in fits)
 
 
 def test_fits_do_not_depend_on_the_curves_beside_them_nor_on_batches() -> None:
@@ -119,13 +119,13 @@ def test_what_a_curve_does_not_determine_is_said() -> None:
     measured = 30.0 * np.exp(-4.0 / VELOCITY)
     fit = one(VELOCITY, measured)
     np.testing.assert_allclose(torque(VELOCITY, fit.parameters), measured, atol=30 * 3e-5)
-    assert fit.status is FitStatus.UNDETERMINED
+    assert fit.status is StribeckFitStatus.UNDETERMINED
     assert "coulomb_ratio" in fit.undetermined
     assert fit.parameters.stribeck_velocity == pytest.approx(4.0, rel=1e-3)
     assert mean_torques([fit], VELOCITY)[0, 1] < 0.01
     # a viscous coefficient at zero is at bound
     fit = one(VELOCITY, eq3(np.array([25.0, 0.5, 3.0, 0.0]), VELOCITY) - 0.3 * VELOCITY**0.3)
-    assert fit.status is FitStatus.AT_BOUND
+    assert fit.status is StribeckFitStatus.AT_BOUND
     assert fit.parameters.viscous_coefficient == 0
     assert fit.standard_errors[3] > 0
     assert "viscous_coefficient at zero" in fit.message
@@ -184,7 +184,7 @@ def _check_finite(fit):
     assert np.isfinite(fit.covariance).all()
     assert np.isfinite(fit.standard_errors).all()
     assert np.isfinite([*mean_torques([fit], VELOCITY)[0], fit.noise, fit.rmse]).all()
-    assert (fit.status is FitStatus.UNDETERMINED) == bool(fit.undetermined)
+    assert (fit.status is StribeckFitStatus.UNDETERMINED) == bool(fit.undetermined)
     assert fit.message.endswith(".")
 
 

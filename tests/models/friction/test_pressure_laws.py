@@ -9,7 +9,7 @@ from scipy.optimize import least_squares
 from models.arrays import FloatArray
 from models.friction.identification import StribeckFit, fit_curves
 from models.friction.pressure_laws import (
-    AsymptoticLaw,
+    AsymptoticPressureLaw,
     fit_asymptotic,
     fit_linear,
     fit_pressure_laws,
@@ -115,7 +115,7 @@ def test_the_band_of_a_line_is_how_far_repeated_tests_scatter() -> None:
 
 def test_the_band_of_the_falling_law_is_how_far_repeated_tests_scatter() -> None:
     rng = np.random.default_rng(22)
-    law = AsymptoticLaw(asymptote=0.6, excess=4.0, decay=1.6e5)
+    law = AsymptoticPressureLaw(asymptote=0.6, excess=4.0, decay=1.6e5)
     deviation = np.full(7, 2e-3)
     true = law(PROTOCOL_PRESSURES)
     drawn = [
@@ -141,7 +141,7 @@ def test_parameters_off_their_law_widen_its_band_and_a_bound_has_none() -> None:
     # what is held at its bound has no band
     flat = np.full(7, 0.6)
     covariance = law_covariance(
-        AsymptoticLaw(asymptote=0.6, excess=0.0, decay=1e5), PROTOCOL_PRESSURES, flat, np.full(7, 0.1)
+        AsymptoticPressureLaw(asymptote=0.6, excess=0.0, decay=1e5), PROTOCOL_PRESSURES, flat, np.full(7, 0.1)
     )
     assert covariance[0, 0] == pytest.approx(0.1**2 / 7)
     assert np.all(covariance[1:] == 0.0)

@@ -9,12 +9,12 @@ import pytest
 
 from models.prognosis.course_shares import CourseName, course_shares
 from models.prognosis.first_passage import predict_first_passage
-from models.tracking.courses import Course
+from models.tracking.courses import CourseForm
 from models.tracking.filters.grid import Grid
 from models.tracking.filters.particle import Particle
 from models.tracking.filters.ukf import Ukf
 from models.tracking.measurement import Measurement
-from models.tracking.posterior import Posterior
+from models.tracking.posterior import TrackPosterior
 from models.tracking.prior import weak
 from tests.models.tracking.tracked_series import CAMPAIGN, NAMES, PRIOR, followed, sent
 
@@ -29,8 +29,8 @@ def accelerating(share: float) -> list[Measurement]:
     return sent(1e4 * x, values, 1e-8)
 
 
-def posterior_of(tracker: Any, seen: list[Measurement]) -> Posterior:
-    found: Posterior = tracker.posterior(
+def posterior_of(tracker: Any, seen: list[Measurement]) -> TrackPosterior:
+    found: TrackPosterior = tracker.posterior(
         followed(tracker, weak(seen[0], falling=True), seen), 1_000, np.random.default_rng(2)
     )
     return found
@@ -53,7 +53,7 @@ def test_a_life_that_accelerates_is_said_to_and_held_and_one_of_eq_6_too(tracker
 def test_no_course_is_lost_while_the_data_say_nothing_of_it() -> None:
     """The particle filter keeps some particles of each, whatever their weight: later tests may speak for them."""
     state = followed(Particle(), PRIOR, CAMPAIGN)
-    counts = np.bincount(state.cloud.course, minlength=len(Course))
+    counts = np.bincount(state.cloud.course, minlength=len(CourseForm))
     assert counts.min() > 0.02 * counts.sum()
 
 

@@ -12,12 +12,12 @@ from scipy.stats import linregress, multivariate_normal
 
 from models.arrays import FloatArray
 from models.degradation import general_order
-from models.degradation.general_order import Degradation, first_passage
+from models.degradation.general_order import DegradationLaw, first_passage
 from models.prognosis import ended_lives
 from models.prognosis.criteria import COURSE_DISCREPANCIES, COURSE_SCATTERS, COURSE_SIZE_SD, OTHER_KIND, VAGUE
 from models.prognosis.ended_lives import (
-    EndedLife,
     Kin,
+    ObservedLife,
     as_its_kind,
     declared_end,
     ended_life,
@@ -26,7 +26,7 @@ from models.prognosis.ended_lives import (
 )
 from models.prognosis.first_passage import weighted_quantiles
 from models.prognosis.stated_end import stated_end
-from models.tracking.courses import FORM_SIZE, Course
+from models.tracking.courses import FORM_SIZE, CourseForm
 from models.tracking.criteria import LEVEL_SIZE, STEP_SIZE
 from models.tracking.measurement import Measurement
 from tests.models.prognosis.sample_scores import crps_of_sample
@@ -59,17 +59,17 @@ def measured(
     return sent(end * shares, values + 0.1 * step * later, 1e-8, later)
 
 
-def ended(end: float, shape: Shape = knee, seed: int = 0) -> EndedLife:
+def ended(end: float, shape: Shape = knee, seed: int = 0) -> ObservedLife:
     tests = measured(end, 1.0, shape, seed)
     progress, values = (np.array(column) for column in zip(*((t.progress, t.value) for t in tests), strict=True))
     return ended_life(progress, values, end, initial=0.1, fraction=0.5)
 
 
-def lives(shape: Shape = knee) -> list[EndedLife]:
+def lives(shape: Shape = knee) -> list[ObservedLife]:
     return [ended(end, shape, number) for number, end in enumerate(ENDS)]
 
 
-def said(tests: list[Measurement], of: list[EndedLife]) -> Kin:
+def said(tests: list[Measurement], of: list[ObservedLife]) -> Kin:
     kin = as_its_kind(tests, tests[-1].progress, of)
     assert kin.weight.sum() == pytest.approx(1.0)
     return kin
@@ -128,23 +128,23 @@ def lawful(end: float, until: float, seed: int) -> list[Measurement]:
     """A life that follows eq. 6, of a kind that does: what is lost and how fast scatter from life to life."""
     rng = np.random.default_rng(seed)
     change, scale = -0.075 * math.exp(0.05 * rng.standard_normal()), 0.5 * math.exp(0.2 * rng.standard_normal())
-    law = Degradation(initial=0.1, change=change, scale=scale, exponent=0.7)
+    law = DegradationLaw(initial=0.1, change=change, scale=scale, exponent=0.7)
     stretch = end / float(first_passage(0.05, law))
     shares = np.arange(0.0, until + 1e-9, 1.0 / 30.0) * end
     return sent(shares, general_order.value(shares / stretch, law) * (1.0 + 0.003 * rng.standard_normal(shares.size)))
 
 
 @pytest.fixture(scope="module")
-def eq_6_kind() -> list[EndedLife]:
+def eq_6_kind() -> list[ObservedLife]:
     return [taught(lawful(end, 1.0, seed), end) for seed, end in enumerate(ENDS)]
 
 
-def test_whole_courses_tell_a_kind_that_follows_eq_6_from_one_with_knees(eq_6_kind: list[EndedLife]) -> None:
-    assert np.mean([life.laws[Course.EQ_6] for life in eq_6_kind]) > 0.8
+def test_whole_courses_tell_a_kind_that_follows_eq_6_from_one_with_knees(eq_6_kind: list[ObservedLife]) -> None:
+    assert np.mean([life.laws[CourseForm.EQ_6] for life in eq_6_kind]) > 0.8
     assert max(sum(taught(measured(end, 1.0, seed=3), end).laws) for end in ENDS[:3]) < 0.1
 
 
-def mean_crps(stage: float, ended_by: list[EndedLife], course: Callable[..., list[Measurement]] = lawful) -> float:
+def mean_crps(stage: float, ended_by: list[ObservedLife], course: Callable[..., list[Measurement]] = lawful) -> float:
     """Of lives at a share of them, in lives; `course` has their tests by end, share and seed."""
     found = []
     for seed, end in enumerate((800.0, 1_000.0, 1_300.0), start=20):
@@ -283,7 +283,7 @@ def test_an_ended_life_has_the_course_of_its_tests_until_its_end_and_is_stored_e
     assert ended_life(progress[:3], values[:3], 1_000.0, initial=0.1, fraction=0.5) is None
     # ended lives are stored exactly
     for life in (lives()[0], replace(lives()[0], deviation=0.1), replace(lives()[1], censored=True)):
-        assert EndedLife.from_dict(life.to_dict()) == life
+        assert ObservedLife.from_dict(life.to_dict()) == life
 
 
 def test_uncertain_and_censored_ends_are_weighed_as_by_brute_force() -> None:

@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 from models.prognosis import first_passage
 from models.prognosis.first_passage import Limit, ends_of_life, predict_first_passage, weighted_quantiles, widened
 from models.tracking.discrepancy import FUTURE, PAST
-from models.tracking.posterior import Posterior
+from models.tracking.posterior import TrackPosterior
 from tests.models.tracking.tracked_series import beside, draws_of
 
 
-def sample(change: list[float], weight: list[float] | None = None, scale: float = 1_000.0) -> Posterior:
+def sample(change: list[float], weight: list[float] | None = None, scale: float = 1_000.0) -> TrackPosterior:
     """Draws with ξ0 = 1 and ε = 1: the end of life at half is φ (1/(1 - 0.5/-Δ) - 1)."""
     draws = draws_of(len(change), initial=1.0, change=change, scale=scale, exponent=1.0)
     return draws if weight is None else replace(draws, weight=np.array(weight))
@@ -112,7 +112,9 @@ def test_arguments_out_of_range(arguments: dict[str, float], message: str) -> No
         predict_first_passage(sample([-1.0]), **arguments)
 
 
-def bent(draws: Posterior, size: float, curvature: float = 0.0, step: float = 0.0, at: float = 0.0) -> Posterior:
+def bent(
+    draws: TrackPosterior, size: float, curvature: float = 0.0, step: float = 0.0, at: float = 0.0
+) -> TrackPosterior:
     """The same draws with a discrepancy whose curvature on the first stretch is as given; span 1,000."""
     n = draws.weight.size
     bends = np.zeros((n, PAST + FUTURE))

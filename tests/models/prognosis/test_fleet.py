@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.degradation.general_order import Degradation, first_passage, value
+from models.degradation.general_order import DegradationLaw, first_passage, value
 from models.prognosis.criteria import FEWEST_TESTS_TO_LEARN
 from models.prognosis.first_passage import ends_of_life
 from models.prognosis.fleet import FleetPrior, pooled, population, taught
-from models.tracking.courses import Course, basis
+from models.tracking.courses import CourseForm, basis
 from models.tracking.filters.ukf import Ukf
 from models.tracking.measurement import Measurement
-from models.tracking.posterior import Posterior
+from models.tracking.posterior import TrackPosterior
 from models.tracking.prior import weak
 from tests.models.prognosis.sample_scores import crps_of_sample
 from tests.models.tracking.tracked_series import draws_of, followed, on_grid, sent
@@ -22,10 +22,10 @@ from tests.models.tracking.tracked_series import draws_of, followed, on_grid, se
 UKF = Ukf()
 
 
-def life(rng: np.random.Generator, scale: float) -> Degradation:
+def life(rng: np.random.Generator, scale: float) -> DegradationLaw:
     """A clutch of a population that is no normal one: uniform in Δ/ξ0 and in log φ, log ε."""
     initial = 0.13 * math.exp(rng.uniform(-0.1, 0.1))
-    return Degradation(
+    return DegradationLaw(
         initial=initial,
         change=-initial * rng.uniform(0.65, 0.85),
         scale=scale * math.exp(rng.uniform(-0.6, 0.6)),
@@ -33,7 +33,7 @@ def life(rng: np.random.Generator, scale: float) -> Degradation:
     )
 
 
-def measured(truth: Degradation, last: float, tests: int, rng: np.random.Generator) -> list[Measurement]:
+def measured(truth: DegradationLaw, last: float, tests: int, rng: np.random.Generator) -> list[Measurement]:
     zeta = np.linspace(0.0, last, tests)
     y = value(zeta, truth) + 0.003 * float(truth.initial) * rng.standard_normal(tests)
     return sent(zeta, y)
@@ -85,11 +85,13 @@ def test_a_population_has_converged() -> None:
     assert (population(samples).mean == found.mean).all()
 
 
-def crps(posterior: Posterior, truth: float) -> float:
+def crps(posterior: TrackPosterior, truth: float) -> float:
     return crps_of_sample(np.minimum(ends_of_life(posterior, 0.5), 1e6), posterior.weight, truth)
 
 
-def predicted(prior: FleetPrior, seen: list[Measurement], rng: np.random.Generator) -> tuple[Posterior, Posterior]:
+def predicted(
+    prior: FleetPrior, seen: list[Measurement], rng: np.random.Generator
+) -> tuple[TrackPosterior, TrackPosterior]:
     """Under the weak prior alone, and under the mixture."""
     beliefs = weak(seen[0], falling=True), prior.prior_for(seen[0])
     under = [on_grid(seen, 1000, rng, each) for each in beliefs]
@@ -145,7 +147,7 @@ def test_no_draw_of_an_unscented_filter_has_all_the_weight() -> None:
         assert prior.together(under[0], under[1], seen[0]).effective_draws > 60.0, count
 
 
-def _misfit(found: Posterior, reference: Posterior) -> float:
+def _misfit(found: TrackPosterior, reference: TrackPosterior) -> float:
     """The largest difference of means, in deviations, or of logarithms of deviations, over the coefficients."""
     worst = 0.0
     for name in ("scale", "exponent", "change"):
@@ -154,7 +156,7 @@ def _misfit(found: Posterior, reference: Posterior) -> float:
     return worst
 
 
-def _brute(prior: FleetPrior, seen: list[Measurement], rng: np.random.Generator) -> Posterior:
+def _brute(prior: FleetPrior, seen: list[Measurement], rng: np.random.Generator) -> TrackPosterior:
     """Draws of the mixture prior, with the likelihood as weights; all five coefficients are drawn."""
     count = 400_000
     first = weak(seen[0], falling=True)
@@ -207,7 +209,7 @@ def test_a_fleet_has_no_say_in_courses_that_it_has_not_learned(log_exponent: flo
         for prior in (weak(seen[0], falling=True), fleet.prior_for(seen[0]))
     )
     together = fleet.together(alone, taught, seen[0])
-    before, after = (np.bincount(p.course, weights=p.weight, minlength=len(Course)) for p in (alone, together))
+    before, after = (np.bincount(p.course, weights=p.weight, minlength=len(CourseForm)) for p in (alone, together))
     odds_before, odds_after = before[1:] / before[1:].sum(), after[1:] / after[1:].sum()
     assert odds_after == pytest.approx(odds_before, abs=0.1)
     assert after[0] / after[1:].sum() > 0.7 * (1.0 - fleet.share) * before[0] / before[1:].sum()

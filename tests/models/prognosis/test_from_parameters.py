@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.degradation.general_order import Degradation, value
+from models.degradation.general_order import DegradationLaw, value
 from models.friction.stribeck import StribeckParameters, torque
 from models.prognosis.criteria import FAR_APART, HORIZON
 from models.prognosis.from_parameters import (
@@ -18,7 +18,7 @@ from models.prognosis.from_parameters import (
     paired,
     shrunk_correlation,
 )
-from models.tracking.posterior import Posterior
+from models.tracking.posterior import TrackPosterior
 from models.tracking.prior import weak
 from tests.models.tracking.tracked_series import draws_of, on_grid, sent
 
@@ -26,15 +26,15 @@ AT = np.linspace(0.0, 12_000.0, 13)
 VELOCITIES = np.linspace(0.2, 12.0, 40)
 #: Eq. 6 of M_s [Nm], M̄_c, V_S [m/s] and C_v at 5 bar.
 TRUTHS = (
-    Degradation(initial=25.0, change=-14.0, scale=4_000.0, exponent=0.6),
-    Degradation(initial=0.8, change=-0.3, scale=5_000.0, exponent=0.8),
-    Degradation(initial=5.0, change=-3.0, scale=3_000.0, exponent=1.0),
-    Degradation(initial=1.5, change=1.0, scale=6_000.0, exponent=0.9),
+    DegradationLaw(initial=25.0, change=-14.0, scale=4_000.0, exponent=0.6),
+    DegradationLaw(initial=0.8, change=-0.3, scale=5_000.0, exponent=0.8),
+    DegradationLaw(initial=5.0, change=-3.0, scale=3_000.0, exponent=1.0),
+    DegradationLaw(initial=1.5, change=1.0, scale=6_000.0, exponent=0.9),
 )
 PER_COF = 150.0
 
 
-def track(truth: Degradation, size: int = 40) -> Posterior:
+def track(truth: DegradationLaw, size: int = 40) -> TrackPosterior:
     """A sample that is sure of its coefficients."""
     law = {"initial": truth.initial, "change": truth.change, "scale": truth.scale, "exponent": truth.exponent}
     return draws_of(size, **law, scatter=1e-6)
@@ -60,7 +60,7 @@ def level(strength: float = 1.0) -> PressureLevel:
     ]
     parameters = np.stack([value(AT, truth) for truth in truths], axis=1)
     cof = mean_cofs(AT, strength)
-    flat = Degradation(initial=cof[0], change=-0.5 * cof[0], scale=4_000.0, exponent=0.7)
+    flat = DegradationLaw(initial=cof[0], change=-0.5 * cof[0], scale=4_000.0, exponent=0.7)
     return PressureLevel(
         progress=AT,
         parameters=parameters,
@@ -156,8 +156,8 @@ def test_disagreement_of_two_normals() -> None:
 # --- Quantities whose measurements err together: what only their sum knows is not lost.
 
 PAIR = (
-    Degradation(initial=20.0, change=-9.0, scale=5000.0, exponent=0.8),
-    Degradation(initial=5.0, change=3.0, scale=9000.0, exponent=0.5),
+    DegradationLaw(initial=20.0, change=-9.0, scale=5000.0, exponent=0.8),
+    DegradationLaw(initial=5.0, change=3.0, scale=9000.0, exponent=0.5),
 )
 #: One errs by +1 where the other errs by -1: their sum is known a hundred times better.
 COVARIANCE = np.array([[0.25, -0.24998], [-0.24998, 0.25]])
@@ -168,7 +168,7 @@ def measured(rng: np.random.Generator) -> np.ndarray:
     return np.stack([value(AT, truth) for truth in PAIR], axis=1) + errors
 
 
-def own(values: np.ndarray, rng: np.random.Generator) -> list[Posterior]:
+def own(values: np.ndarray, rng: np.random.Generator) -> list[TrackPosterior]:
     """Each quantity's track by itself."""
     tests = [sent(AT, column, 0.25) for column in values.T]
     return [on_grid(seen, 1000, rng, weak(seen[0], falling=False)) for seen in tests]

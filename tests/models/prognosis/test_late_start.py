@@ -7,18 +7,18 @@ import numpy as np
 import pytest
 
 from models.arrays import FloatArray
-from models.degradation.general_order import Degradation, first_passage, value
+from models.degradation.general_order import DegradationLaw, first_passage, value
 from models.prognosis.criteria import COUNTED_ELSEWHERE
 from models.prognosis.first_passage import weighted_quantiles
 from models.prognosis.stated_end import StatedEnd, late_start, stated_end
 from models.tracking.courses import FORM_COURSE, FORM_SIZE, SCALE_SIGN, log_form_weight
-from models.tracking.linear_model import Points
+from models.tracking.linear_model import EvaluationPoints
 from models.tracking.measurement import Measurement
 from models.tracking.prior import weak
 from tests import dense
 from tests.models.tracking.tracked_series import on_grid, sent
 
-LAW = Degradation(initial=0.13, change=-0.1, scale=5_000.0, exponent=0.7)
+LAW = DegradationLaw(initial=0.13, change=-0.1, scale=5_000.0, exponent=0.7)
 END = float(first_passage(0.065, LAW))
 
 
@@ -110,7 +110,7 @@ def test_the_probability_is_that_of_the_density_written_out_in_full() -> None:
 def log_evidence(tests: list[Measurement], count: int = 60_000) -> float:
     """By draws of the prior."""
     prior, rng = weak(tests[0], falling=True), np.random.default_rng(2)
-    points = Points(
+    points = EvaluationPoints(
         log_scale=rng.normal(prior.log_scale_mean, prior.log_scale_sd, count),
         log_exponent=rng.normal(prior.log_exponent_mean, prior.log_exponent_sd, count),
         log_scatter=rng.normal(prior.log_scatter_mean, prior.log_scatter_sd, count),

@@ -17,7 +17,7 @@ from models.prognosis.scoring import (
     prognostic_horizon,
 )
 from models.tracking.measurement import Measurement
-from models.tracking.posterior import Posterior
+from models.tracking.posterior import TrackPosterior
 from tests.models.prognosis.sample_scores import crps_of_sample, pit_of_sample
 from tests.models.tracking.tracked_series import PRIOR, draws_of
 
@@ -101,7 +101,7 @@ def measured(progress: float, value: float, *, variance: float = 0.0, epoch: int
     return Measurement(progress=progress, value=value, variance=variance, epoch=epoch)
 
 
-def forecast(posterior: Posterior = FLAT) -> BackCast:
+def forecast(posterior: TrackPosterior = FLAT) -> BackCast:
     """One, made at 1,000 cycles."""
     return BackCast.nothing().forecast(posterior, measured(1_000.0, 1.0), PRIOR)
 

@@ -10,7 +10,7 @@ import pytest
 
 from models.friction.speed_protocol import RPM
 from models.rig.campaign import end_of_life, simulate, simulated_clutch
-from models.rig.programme import CYCLE_ENERGY, WHOLE, Ageing, Programme
+from models.rig.programme import CYCLE_ENERGY, WHOLE, Ageing, RigProgramme
 from models.rig.sampled import RawTest
 from models.rig.simulated_runs import DutyBlock, RunKind, SimulatedRun
 from models.rig.stationary import stationary_test
@@ -68,9 +68,10 @@ def test_a_campaign_ends_with_the_first_test_below_the_stop():
 
 
 @pytest.mark.parametrize(
-    ("programme", "most_tests"), [(Programme(), 6), (replace(WHOLE, raw=RawTest(rate=50.0), ageing=Ageing.ENERGY), 1)]
+    ("programme", "most_tests"),
+    [(RigProgramme(), 6), (replace(WHOLE, raw=RawTest(rate=50.0), ageing=Ageing.ENERGY), 1)],
 )
-def test_the_same_seed_gives_the_same_bits_and_another_does_not(programme: Programme, most_tests: int) -> None:
+def test_the_same_seed_gives_the_same_bits_and_another_does_not(programme: RigProgramme, most_tests: int) -> None:
     first, again, other = (
         [bits(run) for run in simulate(seed, programme=programme, most_tests=most_tests)] for seed in (7, 7, 8)
     )
@@ -92,14 +93,14 @@ def rng(seed: int = 2) -> np.random.Generator:
 def test_what_is_added_does_not_change_the_stationary_tests() -> None:
     quick, whole = (
         [run for run in simulate(3, programme=programme, most_tests=2) if run.plateaus is not None]
-        for programme in (Programme(), WHOLE)
+        for programme in (RigProgramme(), WHOLE)
     )
     assert [run.plateaus.torque.tobytes() for run in quick] == [run.plateaus.torque.tobytes() for run in whole]
 
 
 def test_the_energy_of_a_block_is_that_of_its_engagement() -> None:
     """Witness: the trace's own ∫ M ω dt, which knows nothing of the integrator's sum."""
-    runs = [run for run in simulate(7, programme=Programme(engagements=True), most_tests=3) if run.duty]
+    runs = [run for run in simulate(7, programme=RigProgramme(engagements=True), most_tests=3) if run.duty]
     for run in runs:
         by_trace = float(np.trapezoid(run.record.torque * run.record.speed, run.record.time))
         assert run.duty.energy_per_cycle == pytest.approx(by_trace, rel=0.02)
@@ -107,7 +108,7 @@ def test_the_energy_of_a_block_is_that_of_its_engagement() -> None:
 
 
 def test_energy_ages_the_clutch_by_what_blocks_and_tests_dissipate() -> None:
-    programme = Programme(engagements=True, ageing=Ageing.ENERGY)
+    programme = RigProgramme(engagements=True, ageing=Ageing.ENERGY)
     runs = list(simulate(7, programme=programme, most_tests=3))
     for before, run in itertools.pairwise(runs):
         assert run.wear - before.wear == pytest.approx(run.dissipated() / CYCLE_ENERGY)
@@ -137,7 +138,7 @@ DUTY = DutyBlock(cycles=1, energy_per_cycle=1.0, initial_speed=1.0, maximum_pres
         (partial(simulate, -1), "seed"),
         (partial(simulate, 1, stop_fraction=1.0), "stop_fraction"),
         (partial(simulate, 1, most_tests=0), "most_tests"),
-        (partial(Programme, ageing=Ageing.ENERGY), "needs engagements"),
+        (partial(RigProgramme, ageing=Ageing.ENERGY), "needs engagements"),
         (partial(SimulatedRun, run_id="bench-7", kind=RunKind.RUN_IN, cycles=0), "must start with sim-"),
         (partial(SimulatedRun, run_id="sim-7", kind=RunKind.STATIONARY_STRIBECK, cycles=0), "must carry plateaus"),
         (

@@ -18,17 +18,17 @@ from scipy.optimize import least_squares
 
 from models.arrays import FloatArray
 from models.clutch import Geometry
-from models.degradation.general_order import Degradation, progress_fraction, value
+from models.degradation.general_order import DegradationLaw, progress_fraction, value
 from models.friction.identification import StribeckFit, fit_curves
 from models.friction.pressure_laws import fit_asymptotic, fit_linear
 from models.friction.speed_protocol import REFERENCE_SPEEDS, RPM
 from models.friction.stribeck import PARAMETER_NAMES, slope, torque
 from models.loops.loop_area import Direction
-from models.loops.loops import Loop, evaluate_loops
+from models.loops.loops import FrictionLoop, evaluate_loops
 from models.records.runs import curves_by_pressure
 from models.rig.campaign import simulate, simulated_clutch
 from models.rig.hysteresis import NO_LAG
-from models.rig.programme import Programme
+from models.rig.programme import RigProgramme
 from models.rig.sampled import DynamicTest, sampled_test
 from models.rig.simulated_runs import RunKind, SimulatedRun
 from models.rig.stationary import SHARP, Sensor, stationary_test
@@ -61,7 +61,7 @@ class Life:
         return [fit_curves(curves_by_pressure(run.plateaus, GEOMETRY)) for run in self.runs if run.plateaus is not None]
 
     @cached_property
-    def loops(self) -> dict[int, tuple[Loop, ...]]:
+    def loops(self) -> dict[int, tuple[FrictionLoop, ...]]:
         """By cycles, of the stages."""
         tests = [run for run in self.runs if run.kind is RunKind.DYNAMIC_STRIBECK]
         return {run.cycles: evaluate_loops(run.record, GEOMETRY, None) for run in tests if run.cycles in STAGES}
@@ -97,7 +97,7 @@ def areas_of(clutch: SimulatedClutch, cycles: int, test: DynamicTest) -> FloatAr
     return areas_by_pressure(evaluate_loops(record, GEOMETRY, None))
 
 
-def areas_by_pressure(loops: tuple[Loop, ...]) -> FloatArray:
+def areas_by_pressure(loops: tuple[FrictionLoop, ...]) -> FloatArray:
     """Loop areas [pressures] Nm m/s; every pressure of the protocol was found."""
     assert [loop.pressure for loop in loops] == pytest.approx(PROTOCOL_PRESSURES)
     return np.array([loop.area for loop in loops])
@@ -107,7 +107,7 @@ def areas_by_pressure(loops: tuple[Loop, ...]) -> FloatArray:
 def life(request: pytest.FixtureRequest) -> Life:
     seed = 11
     clutch = SimulatedClutch() if request.param == "nominal" else simulated_clutch(seed)
-    programme = Programme(dynamic=DynamicTest())
+    programme = RigProgramme(dynamic=DynamicTest())
     runs = simulate(seed, clutch=clutch, sensor=SHARP, programme=programme, stop_fraction=0.3, most_tests=19)
     return Life(clutch, tuple(runs))
 
@@ -199,7 +199,7 @@ def test_three_parameters_fall_over_life_and_the_viscous_one_rises_as_eq_6_alike
     # equation 6 describes how a parameter evolves
 
     def miss(x: FloatArray) -> FloatArray:
-        law = Degradation(initial=x[0], change=x[1], scale=np.exp(x[2]), exponent=np.exp(x[3]))
+        law = DegradationLaw(initial=x[0], change=x[1], scale=np.exp(x[2]), exponent=np.exp(x[3]))
         return (value(life.cycles, law) - values) / deviations
 
     start = [values[0], values[-1] - values[0], np.log(4000), 0.0]
@@ -263,7 +263,7 @@ def test_the_area_grows_over_life_up_to_6_bar_and_falls_above(life: Life) -> Non
 
 
 def test_engagements_grow_longer_and_dissipate_more_as_friction_falls(life: Life) -> None:
-    runs = simulate(11, clutch=life.clutch, programme=Programme(engagements=True), most_tests=5)
+    runs = simulate(11, clutch=life.clutch, programme=RigProgramme(engagements=True), most_tests=5)
     blocks = [run for run in runs if run.duty is not None]
     turning = [float(run.record.time[run.record.speed > 50 * RPM][-1]) for run in blocks[1:]]
     energies = [run.duty.energy_per_cycle for run in blocks[1:]]

@@ -8,7 +8,7 @@ import pytest
 from models.diagnosis.effects.catalogue import CATALOGUE
 from models.rig.campaign import simulate, simulated_clutch
 from models.rig.hidden import EFFECTS, clutch_for, effect_of, hidden_in
-from models.rig.programme import Programme
+from models.rig.programme import RigProgramme
 from models.rig.sampled import DynamicTest
 from models.rig.simulated_runs import RunKind, SimulatedRun
 from models.rig.stationary import SHARP
@@ -16,7 +16,7 @@ from models.rig.temperatures import with_plate
 from tests.models.diagnosis.campaigns import campaign_of, look
 
 LEVELS = (4.0e5, 5.5e5, 7.0e5)
-PROGRAMME = Programme(dynamic=DynamicTest(rate=50.0, pressures=LEVELS), pressures=LEVELS)
+PROGRAMME = RigProgramme(dynamic=DynamicTest(rate=50.0, pressures=LEVELS), pressures=LEVELS)
 
 
 def runs(sizes: dict[str, float], most_tests: int) -> list[SimulatedRun]:

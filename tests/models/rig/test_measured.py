@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 
 from models.arrays import FloatArray
 from models.friction.identification import StribeckFit, fit_curves
-from models.friction.pressure_laws import LinearLaw
+from models.friction.pressure_laws import LinearPressureLaw
 from models.friction.speed_protocol import REFERENCE_SPEEDS, RPM
 from models.friction.stribeck import torque
 from models.loops.lag_fit import StationaryCurve
@@ -131,7 +131,7 @@ def test_torque_follows_the_film_as_an_integrator_finds_it() -> None:
 
 def test_a_lag_is_its_law_and_lost_with_use() -> None:
     # the film time is lost with use the more the higher the pressure
-    lag = FrictionLag(film_time=0.2, loss=LinearLaw(intercept=-2.0, slope=0.5e-5), scale=1000.0, exponent=1.0)
+    lag = FrictionLag(film_time=0.2, loss=LinearPressureLaw(intercept=-2.0, slope=0.5e-5), scale=1000.0, exponent=1.0)
     found = lag.film_time_at(np.array([3e5, 5e5, 7e5]), 1000.0)
     assert found == pytest.approx(0.2 * np.exp([-0.0, -0.25, -0.75]))
     # a lag of an attractor alone is the attractor law

@@ -11,7 +11,7 @@ from scipy.stats import multivariate_normal
 from models.degradation.general_order import first_passage, progress_fraction
 from models.prognosis.first_passage import ends_of_life, predict_first_passage, weighted_quantiles
 from models.tracking import courses, linear_model, sampling
-from models.tracking.courses import Course
+from models.tracking.courses import CourseForm
 from models.tracking.criteria import KNEE_HAZARD
 from models.tracking.discrepancy import PAST, drawn, smooth
 from models.tracking.filters.grid import Grid
@@ -19,7 +19,7 @@ from models.tracking.filters.particle import Particle
 from models.tracking.filters.ukf import Ukf
 from models.tracking.history import History
 from models.tracking.measurement import Measurement
-from models.tracking.prior import Prior, weak
+from models.tracking.prior import TrackPrior, weak
 from tests import dense
 from tests.models.tracking.tracked_series import (
     CAMPAIGN,
@@ -37,8 +37,8 @@ from tests.models.tracking.tracked_series import (
 # --- Courses: their coordinates and their prior probabilities.
 
 
-@pytest.mark.parametrize("course", list(Course))
-def test_basis_is_the_share_of_the_change_and_coordinates_lead_back(course: Course) -> None:
+@pytest.mark.parametrize("course", list(CourseForm))
+def test_basis_is_the_share_of_the_change_and_coordinates_lead_back(course: CourseForm) -> None:
     log_scale, log_exponent, kind = np.array([9.2]), np.array([-0.4]), np.array([course])
     scale, exponent = courses.coefficients_at(log_scale, log_exponent, kind)
     zeta = np.array([[0.0], [100.0], [9_000.0]])
@@ -53,10 +53,10 @@ def test_basis_is_the_share_of_the_change_and_coordinates_lead_back(course: Cour
 
 @pytest.mark.parametrize(
     ("course", "expected"),
-    [(Course.EXPONENTIAL, lambda x: -np.expm1(-x)), (Course.LOGARITHM, np.log1p)],
+    [(CourseForm.EXPONENTIAL, lambda x: -np.expm1(-x)), (CourseForm.LOGARITHM, np.log1p)],
     ids=["exponential", "logarithm"],
 )
-def test_courses_without_an_exponent_are_what_they_are_called(course: Course, expected: Any) -> None:
+def test_courses_without_an_exponent_are_what_they_are_called(course: CourseForm, expected: Any) -> None:
     zeta = np.linspace(0.0, 30_000.0, 50)
     found = courses.basis(zeta[:, None], np.array([math.log(5_000.0)]), np.zeros(1), np.array([course]))
     np.testing.assert_allclose(found[:, 0], expected(zeta / 5_000.0), atol=1e-3)
@@ -65,15 +65,15 @@ def test_courses_without_an_exponent_are_what_they_are_called(course: Course, ex
 def test_forms_are_courses_by_sizes_and_ends_lie_beyond_what_was_measured() -> None:
     weight = np.exp(courses.log_form_weight(PRIOR))
     assert weight.sum() == pytest.approx(1.0)
-    assert weight[courses.FORM_COURSE == Course.EQ_6].sum() == pytest.approx(PRIOR.eq_6_share)
+    assert weight[courses.FORM_COURSE == CourseForm.EQ_6].sum() == pytest.approx(PRIOR.eq_6_share)
     np.testing.assert_array_equal(
         courses.form_of(courses.FORM_COURSE, courses.FORM_SIZE, courses.FORM_PROPORTIONAL),
         np.arange(courses.FORM_SIZE.size),
     )
     sure = courses.log_form_weight(replace(PRIOR, eq_6_share=1.0))
-    assert np.isneginf(sure[courses.FORM_COURSE != Course.EQ_6]).all()
+    assert np.isneginf(sure[courses.FORM_COURSE != CourseForm.EQ_6]).all()
     # a course that ends does so beyond what was measured
-    course, place = np.array([Course.EQ_6, Course.ENDING, Course.HYPERBOLIC]), np.full(3, math.log(100.0))
+    course, place = np.array([CourseForm.EQ_6, CourseForm.ENDING, CourseForm.HYPERBOLIC]), np.full(3, math.log(100.0))
     log_scale, stretch = courses.log_scale_at(place, course, 7_000.0)
     np.testing.assert_allclose(np.exp(log_scale), [100.0, 7_100.0, 7_100.0])
     np.testing.assert_allclose(courses.place_of(log_scale, course, 7_000.0), place)
@@ -192,7 +192,7 @@ def test_the_first_signs_of_a_knee_move_the_answer_within_two_tests() -> None:
 EVEN = series(TYPICAL, np.linspace(0.0, 12_000.0, 13), 0.0)
 BELIEF = weak(EVEN[0], falling=True)
 #: Three of eq. 6, with q of 0, 0.03 and 0.1, and one of every other course; of two the scatter is a share of the value.
-POINTS = linear_model.Points(
+POINTS = linear_model.EvaluationPoints(
     log_scale=np.array([8.5, 7.0, 10.0, 9.6, 8.0, 9.9, 8.5, 7.5]),
     log_exponent=np.array([-0.3, 0.4, -1.0, -0.7, 0.5, 0.1, 0.0, 0.0]),
     log_scatter=np.array([-8.0, -6.5, -9.0, -8.0, -7.5, -8.5, -8.0, -8.0]),
@@ -276,7 +276,7 @@ def test_drawn_terms_have_the_posterior_of_the_discrepancy() -> None:
     """Mean and variance of δ at the last run given the data, from 20,000 draws, against conditioning the joint normal."""
     history = History.of(EVEN, BELIEF)
     count = 20_000
-    points = linear_model.Points(
+    points = linear_model.EvaluationPoints(
         log_scale=np.full(count, 7.0),
         log_exponent=np.full(count, 0.4),
         log_scatter=np.full(count, -6.5),
@@ -300,7 +300,7 @@ def test_drawn_terms_have_the_posterior_of_the_discrepancy() -> None:
 
 
 def test_a_prior_survives_its_array_and_checks_itself() -> None:
-    assert Prior.from_array(PRIOR.to_array()) == PRIOR
+    assert TrackPrior.from_array(PRIOR.to_array()) == PRIOR
     with pytest.raises(ValueError, match="change_sd must be positive"):
         replace(PRIOR, change_sd=0.0)
     with pytest.raises(ValueError, match="initial_mean must be finite"):
@@ -363,7 +363,7 @@ def test_a_long_history_is_summed_by_blocks_as_at_once(monkeypatch: pytest.Monke
     values = 0.134 - 0.05 * progress / 5e4 + 4e-4 * rng.standard_normal(tests)
     measurements = sent(progress, values, 1e-8 * rng.uniform(0.5, 2.0, tests), np.floor(progress / 2e4))
     history = History.of(measurements, BELIEF)
-    points = linear_model.Points(
+    points = linear_model.EvaluationPoints(
         log_scale=rng.normal(11.5, 0.5, count),
         log_exponent=rng.normal(-0.3, 0.3, count),
         log_scatter=rng.normal(np.log(4e-4), 0.3, count),
@@ -371,9 +371,9 @@ def test_a_long_history_is_summed_by_blocks_as_at_once(monkeypatch: pytest.Monke
         outlying=(rng.random((tests, count)) < 0.02).astype(float),
     )
 
-    def taken(index: np.ndarray) -> linear_model.Points:
+    def taken(index: np.ndarray) -> linear_model.EvaluationPoints:
         columns = {name: getattr(points, name)[index] for name in ("log_scale", "log_exponent", "log_scatter", "form")}
-        return linear_model.Points(outlying=points.outlying[:, index], **columns)
+        return linear_model.EvaluationPoints(outlying=points.outlying[:, index], **columns)
 
     sums, terms = linear_model.pointwise(history, BELIEF, points)
     some = rng.permutation(count)[:77]

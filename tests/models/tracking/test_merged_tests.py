@@ -5,14 +5,14 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from models.degradation.general_order import Degradation, value
+from models.degradation.general_order import DegradationLaw, value
 from models.prognosis.first_passage import ends_of_life, horizon_at, weighted_quantiles
 from models.tracking.filters.grid import Grid, GridState
 from models.tracking.history import History
-from models.tracking.linear_model import Points, evidence, pointwise, tabulated
+from models.tracking.linear_model import EvaluationPoints, evidence, pointwise, tabulated
 from models.tracking.merged_tests import MergedHistory, judged, merged
-from models.tracking.posterior import Posterior
-from models.tracking.prior import Prior, weak
+from models.tracking.posterior import TrackPosterior
+from models.tracking.prior import TrackPrior, weak
 from models.tracking.sampling import spread_normals, spread_points, with_linear_terms
 from tests.models.tracking.tracked_series import sent
 
@@ -21,11 +21,11 @@ from tests.models.tracking.tracked_series import sent
 USUAL, MOST = 0.03, 0.1
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 SPAN, NOISE = 60_000.0, 4e-4
-LAW = Degradation(initial=0.134, change=-0.08, scale=0.5 * SPAN, exponent=0.7)
-FAST = Degradation(initial=0.134, change=-0.06, scale=SPAN / 400, exponent=0.6)
+LAW = DegradationLaw(initial=0.134, change=-0.08, scale=0.5 * SPAN, exponent=0.7)
+FAST = DegradationLaw(initial=0.134, change=-0.06, scale=SPAN / 400, exponent=0.6)
 
 
-def history_of(law: str, tests: int, seed: int = 0) -> tuple[Prior, History]:
+def history_of(law: str, tests: int, seed: int = 0) -> tuple[TrackPrior, History]:
     """A life of so many tests by a law, and its prior."""
     rng = np.random.default_rng(seed)
     progress = np.linspace(0.0, SPAN, tests)
@@ -50,7 +50,7 @@ def history_of(law: str, tests: int, seed: int = 0) -> tuple[Prior, History]:
 LAWS = ("eq. 6", "fast start", "knee", "late knee", "step", "event", "outlying", "proportional", "wander")
 
 
-def both(prior: Prior, full: History, draws: int = 2_000) -> tuple[Posterior, Posterior]:
+def both(prior: TrackPrior, full: History, draws: int = 2_000) -> tuple[TrackPosterior, TrackPosterior]:
     """Draws by the merged history, and the same points by weights and linear terms of all its tests: what the lattices find
     is shared, so that only the merging makes a difference."""
     short = merged(full, prior)
@@ -64,7 +64,7 @@ def both(prior: Prior, full: History, draws: int = 2_000) -> tuple[Posterior, Po
     for row in np.flatnonzero(short.single):
         at = (full.progress == short.progress[row]) & (full.value == short.value[row])
         outlying[at] = np.maximum(outlying[at], points.outlying[row])
-    all_points = Points(
+    all_points = EvaluationPoints(
         log_scale=points.log_scale,
         log_exponent=points.log_exponent,
         log_scatter=points.log_scatter,
@@ -83,7 +83,7 @@ def both(prior: Prior, full: History, draws: int = 2_000) -> tuple[Posterior, Po
     )
 
 
-def quantities(posterior: Posterior) -> Iterator[np.ndarray]:
+def quantities(posterior: TrackPosterior) -> Iterator[np.ndarray]:
     """The coefficients, the course now and ahead, the scatter and the end of life of every draw."""
     yield from (posterior.initial, posterior.change, posterior.log_scale, posterior.log_exponent, posterior.scatter)
     yield from posterior.values(np.array([SPAN, 1.5 * SPAN]))
@@ -158,11 +158,13 @@ def test_tests_at_one_progress_merge_without_any_loss() -> None:
         "form": forms,
     }
     logs = [
-        evidence(pointwise(history, prior, Points(outlying=np.zeros((history.value.size, 24)), **points))[0], prior)
+        evidence(
+            pointwise(history, prior, EvaluationPoints(outlying=np.zeros((history.value.size, 24)), **points))[0], prior
+        )
         for history in (full, short)
     ]
     np.testing.assert_allclose(logs[1] - logs[0], (logs[1] - logs[0])[0], atol=1e-5)
-    table = Points(outlying=np.zeros((12, 24)), **points).basis(short.progress).T[:, :, None]
+    table = EvaluationPoints(outlying=np.zeros((12, 24)), **points).basis(short.progress).T[:, :, None]
     sums = tabulated(short, prior, table, points["log_scatter"][:, None], forms, np.zeros((12, 24)))
     np.testing.assert_allclose(evidence(sums, prior)[:, 0, 0], logs[1], atol=1e-5)
 

@@ -8,7 +8,7 @@ import pytest
 from scipy.special import ndtri
 from scipy.stats import norm
 
-from models.degradation.general_order import Degradation, value
+from models.degradation.general_order import DegradationLaw, value
 from models.prognosis.first_passage import predict_first_passage
 from models.tracking.criteria import FAR, FEWEST_BEFORE
 from models.tracking.filters import grid as grid_module
@@ -16,8 +16,8 @@ from models.tracking.filters.grid import Grid
 from models.tracking.filters.particle import Particle
 from models.tracking.innovation import innovation, last_innovation
 from models.tracking.measurement import Measurement
-from models.tracking.posterior import Posterior
-from models.tracking.prior import Prior
+from models.tracking.posterior import TrackPosterior
+from models.tracking.prior import TrackPrior
 from tests.models.tracking.tracked_series import FILTERS, PLAIN, PRIOR, TYPICAL, followed, on_grid, series
 
 # --- The standardised innovation against a filter that has not been given the last test at all.
@@ -32,11 +32,11 @@ def measured(off: float) -> list[Measurement]:
     return [*tests[:-1], replace(tests[-1], value=tests[-1].value + off * SCATTER)]
 
 
-def drawn(measurements: list[Measurement], prior=PLAIN) -> Posterior:
+def drawn(measurements: list[Measurement], prior=PLAIN) -> TrackPosterior:
     return on_grid(measurements, 8_000, np.random.default_rng(1), prior)
 
 
-def predicted(before: Posterior, last: Measurement) -> float:
+def predicted(before: TrackPosterior, last: Measurement) -> float:
     """Deviations of the last value by the mixture of normals that the tests before it predict."""
     middle = before.values(np.array([last.progress]))[0]
     below = before.weight @ norm.cdf(last.value, middle, np.sqrt(before.scatter**2 + last.variance))
@@ -78,7 +78,7 @@ def test_one_outlying_run_widens_and_does_not_derail() -> None:
     long = series(TYPICAL, np.linspace(0.0, 12_000.0, 19), 3e-4)
     outlying = [replace(m, value=1.1 * m.value) if i == 17 else m for i, m in enumerate(long)]
 
-    def median(tracker: Any, prior: Prior, measurements: list[Measurement]) -> float:
+    def median(tracker: Any, prior: TrackPrior, measurements: list[Measurement]) -> float:
         posterior = tracker.posterior(followed(tracker, prior, measurements), 2_000, np.random.default_rng(1))
         return predict_first_passage(posterior, fraction=0.5, as_of=12_000.0).end_of_life[0.5]
 
@@ -106,7 +106,7 @@ def test_a_run_a_little_off_may_be_outlying(monkeypatch: pytest.MonkeyPatch) -> 
     particles and by the grid, within 0.06. The grid's first search is blurred and knows nothing of it."""
     scatter = 2.5e-4
     plain = series(TYPICAL, np.linspace(0.0, 14_000.0, 60), scatter, seed=5)
-    sound = Degradation(initial=0.134, change=-0.1, scale=5_000.0, exponent=0.7)
+    sound = DegradationLaw(initial=0.134, change=-0.1, scale=5_000.0, exponent=0.7)
     off = float(value(np.array([plain[55].progress]), sound)[0]) + 3.6 * scatter
     measurements = [replace(m, value=off) if i == 55 else m for i, m in enumerate(plain)]
 

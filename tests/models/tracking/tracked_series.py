@@ -6,22 +6,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from models.degradation.general_order import Degradation, value
-from models.tracking.discrepancy import FUTURE, PAST, Discrepancy
+from models.degradation.general_order import DegradationLaw, value
+from models.tracking.discrepancy import FUTURE, PAST, CourseDiscrepancy
 from models.tracking.filters.grid import Grid
 from models.tracking.filters.particle import Particle
 from models.tracking.filters.ukf import Ukf
 from models.tracking.measurement import Measurement
-from models.tracking.posterior import Posterior
-from models.tracking.prior import Prior, weak
+from models.tracking.posterior import TrackPosterior
+from models.tracking.prior import TrackPrior, weak
 
 FILTERS = [Grid(), Particle(particles=300), Ukf()]
-COLUMNS = [name for name in Posterior.__slots__ if name not in ("discrepancy", "branch")]
+COLUMNS = [name for name in TrackPosterior.__slots__ if name not in ("discrepancy", "branch")]
 NAMES = [tracker.name for tracker in FILTERS]
-TYPICAL = Degradation(initial=0.134, change=-0.1, scale=5_000.0, exponent=0.7)
+TYPICAL = DegradationLaw(initial=0.134, change=-0.1, scale=5_000.0, exponent=0.7)
 
 
-def series(d: Degradation, progress: np.ndarray, noise: float, seed: int = 0) -> list[Measurement]:
+def series(d: DegradationLaw, progress: np.ndarray, noise: float, seed: int = 0) -> list[Measurement]:
     rng = np.random.default_rng(seed)
     return sent(progress, value(progress, d) + noise * rng.standard_normal(progress.size), 1e-8)
 
@@ -31,19 +31,21 @@ def sent(progress: ArrayLike, values: ArrayLike, variance: ArrayLike = 0.0, epoc
     return [Measurement(progress=z, value=y, variance=v, epoch=int(e)) for z, y, v, e in zip(*columns, strict=True)]
 
 
-def on_grid(tests: list[Measurement], count: int, rng: np.random.Generator, prior: Prior | None = None) -> Posterior:
+def on_grid(
+    tests: list[Measurement], count: int, rng: np.random.Generator, prior: TrackPrior | None = None
+) -> TrackPosterior:
     """Draws of what the grid makes of the tests, by the weak prior of a COF where no other is given."""
     return Grid().posterior(Grid().from_history(prior or weak(tests[0], falling=True), tests), count, rng)
 
 
-def draws_of(count: int, **columns: Any) -> Posterior:
+def draws_of(count: int, **columns: Any) -> TrackPosterior:
     """Draws that weigh the same; a number stands for all of them, and scatter is 0.3 % unless given."""
     given = {"weight": 1.0 / count, "scatter": 0.003} | columns
     beside = {"discrepancy": given.pop("discrepancy")} if "discrepancy" in given else {}
-    return Posterior(**{name: np.broadcast_to(np.asarray(x, float), count) for name, x in given.items()}, **beside)
+    return TrackPosterior(**{name: np.broadcast_to(np.asarray(x, float), count) for name, x in given.items()}, **beside)
 
 
-def beside(count: int, **given: Any) -> Discrepancy:
+def beside(count: int, **given: Any) -> CourseDiscrepancy:
     """Over 1,000 cycles, of so many draws: nothing but what is given."""
     nothing = {
         "size": np.zeros(count),
@@ -53,10 +55,12 @@ def beside(count: int, **given: Any) -> Discrepancy:
         "knee": np.full(count, np.inf),
         "steepening": np.ones(count),
     }
-    return Discrepancy(**{"span": 1_000.0} | nothing | given)
+    return CourseDiscrepancy(**{"span": 1_000.0} | nothing | given)
 
 
-def followed(tracker: Any, prior: Prior, measurements: list[Measurement], seed: int | np.random.Generator = 0) -> Any:
+def followed(
+    tracker: Any, prior: TrackPrior, measurements: list[Measurement], seed: int | np.random.Generator = 0
+) -> Any:
     rng, state = np.random.default_rng(seed), tracker.start(prior)
     for measurement in measurements:
         state = tracker.update(state, measurement, rng)

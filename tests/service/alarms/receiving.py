@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
 
-from tests.service.work.waiting import until
+from tests.service.jobs.waiting import until
 
 SECRET = "a-secret-of-tests"  # noqa: S105
 

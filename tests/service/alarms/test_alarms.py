@@ -7,11 +7,11 @@ import pytest
 from fastapi.testclient import TestClient
 
 from service.alarms import outbox, rules
-from service.schemas.alarm import AlarmIn
-from service.workflows import change_alarms
+from service.api.alarm import AlarmIn
+from service.changes import change_alarms
 from tests.service.alarms.receiving import SECRET, Receiver, receiving, signed_rightly
 from tests.service.clients import filled_client, post_run
-from tests.service.work.waiting import until
+from tests.service.jobs.waiting import until
 from tests.support import post_tests, stationary
 
 CYCLES = (0.0, 1000.0, 2000.0, 3000.0)

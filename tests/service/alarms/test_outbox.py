@@ -12,8 +12,8 @@ from fastapi.testclient import TestClient
 from service.alarms import outbox
 from storage.tables import delivery
 from tests.service.alarms.receiving import SECRET, Receiver, receiving
+from tests.service.jobs.waiting import until
 from tests.service.web.routes.granting import context_of
-from tests.service.work.waiting import until
 
 HELD: dict[str, Any] = {"quantity": "state", "clutch_id": "c1"}
 

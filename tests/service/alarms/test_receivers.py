@@ -18,8 +18,8 @@ from fastapi.testclient import TestClient
 from service.alarms import notify, receivers
 from service.alarms.receivers import post, shown, why_not
 from tests.service.alarms.receiving import SECRET, in_thread, receiving
+from tests.service.jobs.waiting import until
 from tests.service.web.routes.granting import granted
-from tests.service.work.waiting import until
 
 BODY = b'{"type": "alarm.test"}'
 RAISED = b'{"type": "alarm.raised", "event": {"name": "n", "quantity": "state", "message": "m"}}'

@@ -18,8 +18,8 @@ from service.app import create_app
 from service.cli.serving.serve import bound
 from service.settings import Settings
 from storage.engine.sqlite.connect import service_lock
+from tests.service.answers.test_verification import DAMAGE, execute
 from tests.service.clients import client_of, client_on, clutchlife
-from tests.service.queries.test_verification import DAMAGE, execute
 from tests.storage.samples import OLD, integrity, old_database, revision
 from tests.support import ONCE, free_port, stationary, wait_until_ready
 

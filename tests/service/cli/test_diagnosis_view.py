@@ -9,8 +9,8 @@ from rich.console import Console
 
 from models.diagnosis.campaign import Campaign
 from service.cli.diagnose import shown
-from service.lives.diagnosis.report import empty, public
-from tests.service.workflows.stand_in_engine import diagnose
+from service.clutch.diagnosis.report import empty, public
+from tests.service.changes.stand_in_engine import diagnose
 
 LIFE = {"status": "predicted", "remaining_cycles": {"0.05": 4000.0, "0.5": 12345.6, "0.95": None}}
 STATE = {"adoptable": True, "adopted": True}

@@ -9,9 +9,9 @@ from typing import Any, get_args
 import numpy as np
 import pytest
 
-from models.friction.pressure_laws import AsymptoticLaw, LinearLaw
-from service.schemas.clutch import ClutchIn
-from service.schemas.life import QuantityName
+from models.friction.pressure_laws import AsymptoticPressureLaw, LinearPressureLaw
+from service.api.clutch import ClutchIn
+from service.api.life import QuantityName
 from tests.browser.driving import FLAT, chromium
 from tests.browser.modules import Module, load, open_page
 from tests.support import Server, serving
@@ -309,11 +309,14 @@ FALLING = {
 
 @pytest.mark.parametrize(
     ("drawn", "law"),
-    [(LINEAR, LinearLaw(intercept=2.0, slope=3.0)), (FALLING, AsymptoticLaw(asymptote=0.6, excess=4.0, decay=1.6))],
+    [
+        (LINEAR, LinearPressureLaw(intercept=2.0, slope=3.0)),
+        (FALLING, AsymptoticPressureLaw(asymptote=0.6, excess=4.0, decay=1.6)),
+    ],
     ids=["linear", "falling"],
 )
 def test_a_law_is_drawn_with_the_band_of_its_covariance(
-    loaded: Callable[[str], Module], drawn: dict[str, Any], law: LinearLaw | AsymptoticLaw
+    loaded: Callable[[str], Module], drawn: dict[str, Any], law: LinearPressureLaw | AsymptoticPressureLaw
 ) -> None:
     laws = loaded("quantities/pressure_laws.js")
     for pressure in (4.0, 5.5, 7.0):

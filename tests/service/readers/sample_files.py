@@ -12,7 +12,7 @@ import pyarrow.parquet  # type: ignore[import-untyped]
 from nptdms import ChannelObject, RootObject, TdmsWriter  # type: ignore[import-untyped]
 
 from models.arrays import FloatArray
-from service.readers.channels import Channels
+from service.readers.assemble import Channels
 from service.readers.read_file import read_file, reading_of
 
 UNITS = {"time_s": "s", "pressure_bar": "bar", "speed_rpm": "rpm", "torque_nm": "Nm", "oil_temperature_c": "°C"}

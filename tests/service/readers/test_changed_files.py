@@ -15,7 +15,7 @@ import pandas as pd  # type: ignore[import-untyped]
 import pytest
 import scipy.io
 
-from service.columns import check_columns
+from service.channels import check_columns
 from service.errors import InvalidError, ServiceError, TooLargeError
 from service.readers.limits import LIMITS
 from service.readers.read_file import read_file

@@ -25,10 +25,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from nptdms import ChannelObject, TdmsWriter  # type: ignore[import-untyped]
 
-from service.columns import CHANNELS
+from service.channels import CHANNELS
 from service.errors import InvalidError, TooLargeError
 from service.readers import hdf5 as hdf5_reader
-from service.readers.channels import Channels, to_channels
+from service.readers.assemble import Channels, to_channels
 from service.readers.limits import LIMITS
 from service.readers.read_file import preview_file, read_file
 from service.readers.table import Reading

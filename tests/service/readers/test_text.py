@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from models.arrays import FloatArray
 from service.errors import InvalidError, ServiceError, TooLargeError
 from service.readers import column_names, unit_table
-from service.readers.channels import to_channels
+from service.readers.assemble import to_channels
 from service.readers.column_names import column_of, known_channel
 from service.readers.limits import LIMITS, LONGEST_TITLE
 from service.readers.numerals import NUMBER

@@ -6,7 +6,7 @@ import pytest
 from service.errors import InvalidError
 from service.readers.column_names import choose, column_of, known_channel, parse_map
 from service.readers.read_file import reading_of
-from service.readers.table import Choice, Column, Reading
+from service.readers.table import ColumnChoice, FileColumn, Reading
 from service.readers.unit_table import conversion
 
 
@@ -47,11 +47,14 @@ def test_titles_hold_names_and_units(title: str, name: str, unit: str | None) ->
 def test_columns_are_chosen_by_their_names_by_a_map_which_wins_and_by_their_group() -> None:
     absolute = [column_of("p_abs [bar]"), column_of("M [Nm]")]  # another pressure
     assert [taken.channel for taken in choose(absolute, Reading())] == ["torque_nm"]
-    assert parse_map("torque_nm:a,b:c, time_s:t") == {"torque_nm": Choice(column="a,b:c"), "time_s": Choice(column="t")}
-    headers = [Column("torque_nm"), Column("Mz"), Column("other")]
+    assert parse_map("torque_nm:a,b:c, time_s:t") == {
+        "torque_nm": ColumnChoice(column="a,b:c"),
+        "time_s": ColumnChoice(column="t"),
+    }
+    headers = [FileColumn("torque_nm"), FileColumn("Mz"), FileColumn("other")]
     (column,) = choose(headers, reading_of("torque_nm:Mz"))
     assert (column.channel, column.index) == ("torque_nm", 1)
-    headers = [Column("M", "Nm", "fast"), Column("M", "Nm", "slow")]
+    headers = [FileColumn("M", "Nm", "fast"), FileColumn("M", "Nm", "slow")]
     with pytest.raises(InvalidError, match="torque_nm must be one column, got fast/M and slow/M"):
         choose(headers, Reading())
     with pytest.raises(InvalidError, match="torque_nm must be one column"):

@@ -13,16 +13,16 @@ from fastapi import Request
 from fastapi.testclient import TestClient
 from httpx2 import Client
 
-from service.queries import series
-from service.web import answers, auth
+from service.answers import series
+from service.web import auth, responses
 from service.web.middleware import Polls
 from storage.engine.errors import DatabaseBusy
 from storage.engine.opening import open_database
 from storage.engine.sqlite.database import back_up
 from tests.benchmarks.memory import resident
 from tests.service.clients import client_on
+from tests.service.jobs.replaying import replay_clutch
 from tests.service.web.routes.granting import granted, revoke_all
-from tests.service.work.replaying import replay_clutch
 from tests.support import serving, stationary
 
 # --- Answers that are kept by the clutch's revision: computed once, and never given when they no longer hold.
@@ -111,7 +111,7 @@ def test_an_unknown_clutch_is_unknown_however_often_it_is_asked_for_and_whatever
         asked.append((query.__name__, clutch_id))
         return 0, b'{"items":[]}'
 
-    monkeypatch.setattr(answers, "shared_answer", kept)
+    monkeypatch.setattr(responses, "shared_answer", kept)
     for name in ASKED:
         assert [client.get(f"/v1/clutches/nobody/{name}").status_code for _ in range(2)] == [404, 404]
     assert asked == []
@@ -127,14 +127,14 @@ def test_idle_workers_on_a_busy_machine_are_waited_for_for_a_while(
     post(client, 1000.0)
     before = client.get(f"{BASE}/degradation")
     post(client, 2000.0)
-    made, ready = answers.revision_and_json, threading.Event()
+    made, ready = responses.revision_and_json, threading.Event()
 
     def slowly(*arguments: Any) -> tuple[int, bytes]:
         ready.wait(20)
         return made(*arguments)
 
-    monkeypatch.setattr(answers, "revision_and_json", slowly)
-    monkeypatch.setattr(answers, "WAIT_SECONDS", 0.2)
+    monkeypatch.setattr(responses, "revision_and_json", slowly)
+    monkeypatch.setattr(responses, "WAIT_SECONDS", 0.2)
     given = client.get(f"{BASE}/degradation")
     assert not ready.is_set()
     assert (given.headers["ETag"], given.content) == (before.headers["ETag"], before.content)

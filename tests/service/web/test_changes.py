@@ -3,8 +3,8 @@
 import pytest
 from fastapi.testclient import TestClient
 
-from service import records
-from service.lives.plausibility.doubts import Judged
+from service import repository
+from service.clutch.plausibility.doubts import Judged
 from service.web.auth import SCOPES
 from tests.service.web.routes.granting import granted
 from tests.support import stationary
@@ -21,8 +21,8 @@ def post(client: TestClient, **headers: str) -> None:
 
 @pytest.fixture(autouse=True)
 def _nothing_is_doubted(monkeypatch: pytest.MonkeyPatch) -> None:
-    for workflow in ("ingest_run", "change_run"):
-        monkeypatch.setattr(f"service.workflows.{workflow}.doubts_together", lambda *_, **__: Judged())
+    for change in ("ingest_run", "change_run"):
+        monkeypatch.setattr(f"service.changes.{change}.doubts_together", lambda *_, **__: Judged())
 
 
 def test_a_change_moves_the_tag_on_its_repeat_does_not_and_states_are_asked_for(client: TestClient) -> None:
@@ -126,8 +126,8 @@ def test_a_clutch_that_others_change_all_the_time_is_busy_and_not_computed_for_e
 ) -> None:
     assert client.post("/v1/clutches/c1/runs", json=stationary(0.0, run_id="r")).status_code == 201
     asked: list[int] = []
-    monkeypatch.setattr(records, "unchanged", lambda *_: asked.append(1))
-    monkeypatch.setattr(records, "MAX_ATTEMPTS", 3)
+    monkeypatch.setattr(repository, "unchanged", lambda *_: asked.append(1))
+    monkeypatch.setattr(repository, "MAX_ATTEMPTS", 3)
     for method, path, body in (
         ("POST", "/runs", stationary(1000.0)),
         ("POST", "/runs/r/withdraw", {"reason": "slipped"}),

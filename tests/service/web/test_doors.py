@@ -20,20 +20,20 @@ import httpx2
 import pytest
 from fastapi.testclient import TestClient
 
+from service.answers import scores
+from service.answers.raw_run import copy_file
 from service.errors import BusyError
-from service.queries import scores
-from service.queries.raw_run import copy_file
+from service.jobs.workers import Lane
 from service.web import bodies, files, limits
 from service.web.bodies import Takes
 from service.web.files import Copies, emptied_folder
 from service.web.middleware import Answers
 from service.web.routes import inspections, rigs, runs
-from service.work.workers import Lane
 from storage.encoding import to_text
 from tests.benchmarks.memory import family, resident
 from tests.service.clients import client_on, csv_text
+from tests.service.jobs.waiting import until
 from tests.service.web.routes.granting import context_of
-from tests.service.work.waiting import until
 from tests.support import ONCE, serving, stationary
 
 RUNS = "/v1/clutches/c1/runs"

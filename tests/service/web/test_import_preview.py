@@ -7,7 +7,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from tests.service.clients import csv_text
-from tests.service.run_files.test_upload import dynamic_record, raw_record
+from tests.service.runs.test_upload import dynamic_record, raw_record
 from tests.support import SPEEDS_RPM, stationary
 
 ADDRESS = "/v1/import/preview"

@@ -103,7 +103,7 @@ def test_more_clutches_cost_no_more_unless_each_is_asked_for(database_url: str, 
 #: One of several processes at a port: it counts two requests and a call, then says all metrics.
 ONE_OF_SEVERAL = """
 import sys
-from service.work.workers import Lane
+from service.jobs.workers import Lane
 from service.web.metrics import Metrics
 from storage.engine.opening import open_database
 metrics = Metrics()

@@ -11,11 +11,11 @@ from typing import Any
 import pytest
 from fastapi.testclient import TestClient
 
-from service.queries.verification import check_results, check_runs
-from service.run_files.rig_profile import Named, _regex, named, pattern_for
-from service.schemas.rig import RigProfile
-from storage.channels import FILE
+from service.answers.verification import check_results, check_runs
+from service.api.rig import RigProfile
+from service.runs.rig_profile import Named, _regex, named, pattern_for
 from storage.engine.opening import open_database
+from storage.raw_columns import FILE
 from storage.rigs import MAX_AT_ONCE
 from storage.tables import channel
 from tests.browser.lives import loops

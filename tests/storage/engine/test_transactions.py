@@ -7,7 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-from storage import channels, clutches, runs
+from storage import clutches, raw_columns, runs
 from storage.engine.database import Database
 from storage.engine.errors import DatabaseBusy, StorageUnavailable
 from storage.engine.opening import open_database
@@ -48,7 +48,9 @@ def test_threads_take_turns_and_readers_never_see_half_a_run(database: Database)
                 clutch = clutches.get(connection, CLUTCH)
                 keys = [row.run_key for row in runs.in_order(connection, CLUTCH)]
                 assert clutch.revision == len(keys)
-                assert all(len(channels.values_of(channels.stored_of_run(connection, key))) == 3 for key in keys[-3:])
+                assert all(
+                    len(raw_columns.values_of(raw_columns.stored_of_run(connection, key))) == 3 for key in keys[-3:]
+                )
             looks += 1
             time.sleep(0.002)
         return looks

@@ -9,7 +9,7 @@ from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
 from alembic.script import ScriptDirectory
 
-from models.prognosis.ended_lives import EndedLife
+from models.prognosis.ended_lives import ObservedLife
 from storage import assumptions, clutches, diagnoses
 from storage.encoding import to_text
 from storage.engine.database import Database
@@ -110,7 +110,7 @@ def test_ended_lives_that_were_stored_before_they_had_a_law_can_be_read(tmp_path
         connection.execute("INSERT INTO fleet_prior VALUES ('{}', 1, '', '', '[]', ?, '1.0.0')", (content,))
     with closing(open_database(f"sqlite:///{path}")) as database, database.reading() as connection:
         (row,) = assumptions.current_fleet_priors(connection)
-    lives = [EndedLife.from_dict(life) for name in ("ended", "censored") for life in row.content[name]]
+    lives = [ObservedLife.from_dict(life) for name in ("ended", "censored") for life in row.content[name]]
     unknown = ended | {"laws": [0.0] * 6}
     assert [life.to_dict() for life in lives] == [unknown, unknown | {"censored": True}]
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from models.degradation.general_order import progress_fraction
 from models.tracking.measurement import Measurement
-from models.tracking.posterior import Posterior
-from models.tracking.prior import Prior
+from models.tracking.posterior import TrackPosterior
+from models.tracking.prior import TrackPrior
 
 _DRAWS = 40_000
 
@@ -20,7 +20,7 @@ _DRAWS = 40_000
 class ImportanceState:
     """All measurements so far; nothing is computed before a posterior is wanted."""
 
-    prior: Prior
+    prior: TrackPrior
     measurements: tuple[Measurement, ...] = ()
 
 
@@ -33,7 +33,7 @@ class Importance:
         """`importance`."""
         return "importance"
 
-    def start(self, prior: Prior) -> ImportanceState:
+    def start(self, prior: TrackPrior) -> ImportanceState:
         """The prior itself."""
         return ImportanceState(prior=prior)
 
@@ -41,7 +41,7 @@ class Importance:
         """The state with one more measurement."""
         return replace(state, measurements=(*state.measurements, measurement))
 
-    def posterior(self, state: ImportanceState, size: int, rng: np.random.Generator) -> Posterior:
+    def posterior(self, state: ImportanceState, size: int, rng: np.random.Generator) -> TrackPosterior:
         """`size` draws of equal weight, taken again from those of the prior by their weights."""
         prior = state.prior
         means = [prior.log_scale_mean, prior.log_exponent_mean, prior.log_scatter_mean]
@@ -62,7 +62,7 @@ class Importance:
         taken = rng.choice(_DRAWS, size, p=weight / weight.sum())
         root = np.linalg.cholesky(np.linalg.inv(precision[taken]))
         initial, change = (mean[taken] + np.einsum("nij,nj->ni", root, rng.standard_normal((size, 2)))).T
-        return Posterior(
+        return TrackPosterior(
             weight=np.full(size, 1.0 / size),
             initial=initial,
             change=change,

@@ -149,7 +149,7 @@ def test_the_marginal_of_log_scale_against_plain_quadrature() -> None:
     prior = replace(PLAIN, log_exponent_sd=1e-3, log_scatter_sd=1e-3, log_exponent_mean=-0.36, log_scatter_mean=-7.8)
     log_scale = np.linspace(7.5, 9.5, 4_001)
     history = History.of(CAMPAIGN, prior)
-    points = linear_model.Points(
+    points = linear_model.EvaluationPoints(
         log_scale=log_scale,
         log_exponent=np.full(4_001, -0.36),
         log_scatter=np.full(4_001, -7.8),

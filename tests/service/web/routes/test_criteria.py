@@ -9,9 +9,9 @@ from fastapi.testclient import TestClient
 from models.clutch import Geometry
 from models.friction.stribeck import StribeckParameters, torque
 from models.rig.campaign import simulate
-from models.rig.programme import Programme
+from models.rig.programme import RigProgramme
 from models.rig.sampled import DynamicTest
-from service.run_files.simulated import simulated_body
+from service.runs.simulated import simulated_body
 from tests.service.clients import filled_client, post_run
 from tests.support import one_quick
 
@@ -24,7 +24,7 @@ def tested(client: TestClient) -> None:
     """A simulated clutch whose friction soon falls with speed at 100 rpm, six tests with loops."""
     record = {"clutch_id": "s", "origin": "simulated", "end_of_life": {"criteria": [{"quantity": "mean_cof"}, SHUDDER]}}
     assert client.post("/v1/clutches", json=record).status_code == 201
-    for run in simulate(7, most_tests=6, programme=Programme(dynamic=DynamicTest(rate=25.0, pressures=(5e5, 7e5)))):
+    for run in simulate(7, most_tests=6, programme=RigProgramme(dynamic=DynamicTest(rate=25.0, pressures=(5e5, 7e5)))):
         post_run(client, simulated_body(run), "s")
 
 

@@ -17,8 +17,8 @@ from service.web import readiness
 from service.web.readiness import available_memory
 from tests.benchmarks.memory import family
 from tests.service.clients import client_on
+from tests.service.jobs.waiting import until
 from tests.service.web.routes.granting import context_of
-from tests.service.work.waiting import until
 from tests.support import ONCE, serving
 
 WHOLE = dict.fromkeys(("database", "disk", "memory", "workers"), "ok")

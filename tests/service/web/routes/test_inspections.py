@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from fastapi.testclient import TestClient
 
-from service.workflows import inspect_clutch
+from service.changes import inspect_clutch
 from tests.service.web.routes.granting import granted
 from tests.service.web.routes.surfaces import FRESH, JPEG, WEBP, WORN, inspected, png, sha256
 from tests.support import post_tests

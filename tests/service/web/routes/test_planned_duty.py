@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from fastapi.testclient import TestClient
 
-from service.lives.plausibility.doubts import Judged
+from service.clutch.plausibility.doubts import Judged
 from tests.service.clients import filled_client, post_run
 from tests.support import post_tests, stationary
 
@@ -19,7 +19,7 @@ QUANTILES = ("0.05", "0.5", "0.95")
 @pytest.fixture(scope="module", autouse=True)
 def _nothing_is_doubted() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr("service.workflows.ingest_run.doubts_together", lambda *_, **__: Judged())
+        patched.setattr("service.changes.ingest_run.doubts_together", lambda *_, **__: Judged())
         yield
 
 

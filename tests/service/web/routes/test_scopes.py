@@ -15,8 +15,8 @@ from service.web.auth import SCOPES, Scope, is_loopback
 from storage import jobs, keys
 from storage.jobs import JobRow
 from tests.service.clients import client_on
+from tests.service.jobs.waiting import until
 from tests.service.web.routes.granting import AT, context_of, granted, revoke_all
-from tests.service.work.waiting import until
 from tests.support import serving, stationary
 
 CLUTCH = "/v1/clutches/{clutch_id}"

@@ -12,10 +12,10 @@ import pytest
 from fastapi.testclient import TestClient
 
 from service.errors import BusyError
-from service.work.workers import Lane
+from service.jobs.workers import Lane
 from tests.service.clients import client_on
+from tests.service.jobs import calls
 from tests.service.web.routes.granting import context_of, granted
-from tests.service.work import calls
 from tests.support import post_tests, serving, stationary
 
 CLUTCHES = "/v1/clutches"

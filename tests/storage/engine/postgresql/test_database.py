@@ -9,7 +9,7 @@ import pytest
 from sqlalchemy import URL, make_url, text
 from sqlalchemy.exc import ProgrammingError
 
-from storage import changes, channels, clutches
+from storage import changes, clutches, raw_columns
 from storage.engine.database import Database
 from storage.engine.errors import (
     DatabaseBusy,
@@ -112,7 +112,7 @@ def test_a_database_of_an_earlier_revision_is_not_migrated_under_a_service(datab
         with database.reading() as connection:
             assert current(connection) == head()
             assert connection.exec_driver_sql("SELECT count(later), count(*) FROM clutch").one() == (0, 1)
-            kept = channels.values_of(channels.stored_of_run(connection, run_key))
+            kept = raw_columns.values_of(raw_columns.stored_of_run(connection, run_key))
             assert all(kept[name].tobytes() == column.tobytes() for name, column in columns(1).items())
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from storage import channels, clutches, runs
+from storage import clutches, raw_columns, runs
 from storage.engine.database import Database
 from storage.engine.errors import DatabaseBusy, ServiceRuns, StorageUnavailable
 from storage.engine.opening import open_database
@@ -59,7 +59,9 @@ def test_a_copy_while_the_service_writes_is_one_state(busy: Database, tmp_path: 
             rows = runs.in_order(connection, CLUTCH)
             clutch = clutches.get(connection, CLUTCH)
             assert clutch.revision == len(rows)
-            assert all(len(channels.values_of(channels.stored_of_run(connection, row.run_key))) == 3 for row in rows)
+            assert all(
+                len(raw_columns.values_of(raw_columns.stored_of_run(connection, row.run_key))) == 3 for row in rows
+            )
 
 
 def test_a_copy_during_an_open_transaction_is_the_state_before_it(busy: Database, tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from storage import channels, clutches, runs
+from storage import clutches, raw_columns, runs
 from storage.engine.database import Database
 from storage.engine.opening import open_database
 from tests.storage.samples import CLUTCH, child, clutch_row, columns, integrity, store_run, write_to
@@ -20,7 +20,7 @@ SUICIDE = """
 import os, signal, sys
 import storage.engine.sqlite.connect
 import storage.engine.opening
-from storage import channels, clutches, runs
+from storage import clutches, raw_columns, runs
 from tests.storage.samples import columns, new_run
 path, mode, moment, length = sys.argv[1], sys.argv[2], sys.argv[3], int(sys.argv[4])
 storage.engine.sqlite.connect.JOURNAL_MODE = mode
@@ -32,13 +32,13 @@ with database.writing() as connection:
     reached("begun")
     key = runs.insert(connection, new_run(1))
     reached("run inserted")
-    channels.write(connection, key, channels.encoded(columns(1, length)))
+    raw_columns.write(connection, key, raw_columns.encoded(columns(1, length)))
     reached("channels written")
     clutches.bump_revision(connection, "bench3-017")
     if mode == "delete":  # what a rollback journal must undo: pages that have reached the file already
         connection.exec_driver_sql("PRAGMA cache_spill=ON")
         connection.exec_driver_sql("PRAGMA cache_size=2")
-        channels.values_of(channels.stored_of_run(connection, key))
+        raw_columns.values_of(raw_columns.stored_of_run(connection, key))
         connection.exec_driver_sql("UPDATE channel SET data = zeroblob(200000)")
     reached("all written")
 """
@@ -74,7 +74,7 @@ def assert_whole(database: Database) -> int:
         rows = runs.in_order(connection, CLUTCH)
         assert [row.run_id for row in rows] == [f"run-{number:04d}" for number in range(len(rows))]
         for number, row in enumerate(rows):
-            stored = channels.values_of(channels.stored_of_run(connection, row.run_key))
+            stored = raw_columns.values_of(raw_columns.stored_of_run(connection, row.run_key))
             expected = columns(number, stored["torque_nm"].size)
             assert {name: each.tobytes() for name, each in stored.items()} == {
                 name: each.tobytes() for name, each in expected.items()

@@ -1,0 +1,317 @@
+"""The cache of computed answers: each answer is computed once and shared between threads.
+
+Where several ask for an answer that is not there yet, one computes it and the others wait for it. What takes a second to
+compute is given as it was while a newer one is made (`Revalidation`).
+"""
+
+import asyncio
+import hashlib
+import logging
+import re
+import threading
+from collections import OrderedDict
+from collections.abc import Callable, Hashable, Iterable
+from concurrent.futures import Future
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from service.errors import BusyError
+from service.paging import LONGEST_CURSOR
+from service.settings import CODE_VERSION
+from storage import clutches
+from storage.encoding import to_text
+from storage.engine.database import Database, SharedAnswer
+from storage.engine.errors import StorageError
+
+_log = logging.getLogger("clutchlife")
+
+#: Bytes that a kept answer takes beside its body: its key, its tag and its entry. Measured: 700 to 1,100 with a cursor.
+KEPT_BESIDE_BYTES = 1024
+#: The end of a list that is answered as JSON and goes on: the cursor of its next page.
+_GOES_ON = re.compile(rb'"next":"([A-Za-z0-9_-]+)"\}$')
+
+
+def build_of(folders: Iterable[Path]) -> str:
+    """The release, and a digest of the code in these folders and of the numerical libraries, by which two builds differ."""
+    digest = hashlib.sha256(f"numpy {version('numpy')} scipy {version('scipy')}".encode())
+    for folder in folders:
+        for path in sorted(folder.rglob("*.py")):
+            digest.update(f"\0{folder.name}/{path.relative_to(folder)}\0".encode() + path.read_bytes())
+    return f"{CODE_VERSION}+{digest.hexdigest()[:16]}"
+
+
+#: That of the code as it was loaded: what is installed under a running service later is another.
+BUILD = build_of(Path(__file__).parents[2] / name for name in ("models", "storage", "service"))
+
+
+@dataclass(frozen=True, slots=True)
+class Page:
+    """The bytes of a page whose format has no place for the next one's cursor, and that cursor, None on the last page."""
+
+    body: bytes
+    next: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class CachedAnswer:
+    """An answer's bytes, the strong entity tag that follows from them, and the cursor of the next page where one follows."""
+
+    body: bytes
+    tag: str
+    next: str | None = None
+
+    @property
+    def size(self) -> int:
+        """Bytes that it takes where it is kept: the empty ones of many keys take room too."""
+        return len(self.body) + KEPT_BESIDE_BYTES
+
+    @classmethod
+    def of(cls, made: bytes | Page) -> "CachedAnswer":
+        """The answer with its tag. The tag of a page covers its cursor, which is not in its bytes."""
+        if isinstance(made, Page):
+            digest = hashlib.sha256(made.body + (made.next or "").encode())
+            return cls(made.body, f'"{digest.hexdigest()[:32]}"', made.next)
+        goes_on = _GOES_ON.search(made, max(0, len(made) - LONGEST_CURSOR - 32))
+        return cls(made, f'"{hashlib.sha256(made).hexdigest()[:32]}"', None if goes_on is None else goes_on[1].decode())
+
+
+def to_json(payload: object) -> bytes:
+    """JSON in UTF-8; ValueError on a number that JSON cannot carry: none may leave."""
+    return to_text(payload).encode()
+
+
+def name_of(query: Callable[..., object]) -> str:
+    """The name of a query in the cache: its module and function."""
+    return f"{query.__module__}.{query.__qualname__}"
+
+
+def revision_and_json(
+    database: Database, query: Callable[..., dict[str, Any]], clutch_id: str, arguments: tuple[Hashable, ...]
+) -> tuple[int, bytes]:
+    """A clutch's revision, and what `query(database, clutch_id, *arguments)` gives at that or a later one, as JSON.
+
+    Where several services share the database, what one of them computed without `arguments` is not computed again.
+    """
+    with database.reading() as connection:
+        revision = clutches.revision(connection, clutch_id) or 0
+    shared = None if arguments else shared_answer(database, query, clutch_id)
+    if shared is not None and shared[0] >= revision:
+        return shared
+    body = to_json(query(database, clutch_id, *arguments))
+    if not arguments:
+        name = name_of(query)
+        new_answer = SharedAnswer(clutch_id=clutch_id, name=name, release=BUILD, revision=revision, body=body)
+        try:
+            database.share(new_answer)
+        except StorageError as error:  # as after a restart of the server: it is an answer all the same
+            _log.warning("an answer could not be shared: %s", error)
+    return revision, body
+
+
+def shared_answer(database: Database, query: Callable[..., object], clutch_id: str) -> tuple[int, bytes] | None:
+    """What a service on this database computed last without arguments, and its revision; None where it cannot be read."""
+    try:
+        newest = database.shared_answer(clutch_id, name_of(query), BUILD)
+    except StorageError as error:
+        _log.warning("a shared answer could not be read: %s", error)
+        return None
+    return None if newest is None else (newest.revision, newest.body)
+
+
+class AnswerCache:
+    """The last answers; the least lately asked for goes first. `most_bytes` bounds their sizes together.
+
+    Of each key the answer of one version is held, that whose making began last: one that was superseded is not asked for
+    again. What is `pinned` stays: its next answer is being made, and its last one is given meanwhile.
+    """
+
+    def __init__(self, most_bytes: int) -> None:
+        self._most = most_bytes
+        self._held = 0
+        self._begun = 0
+        self.pinned: set[Hashable] = set()
+        self._answers: OrderedDict[Hashable, tuple[Hashable, CachedAnswer, int]] = (
+            OrderedDict()
+        )  # and which begin it was
+        self._making: dict[tuple[Hashable, Hashable], Future[CachedAnswer]] = {}
+        self._lock = threading.Lock()
+
+    def held(self, key: Hashable, version: Hashable) -> CachedAnswer | None:
+        """The answer for `key` where it is there and of `version`."""
+        with self._lock:
+            return self._current(key, version)
+
+    def __contains__(self, key: Hashable) -> bool:
+        with self._lock:
+            return key in self._answers
+
+    def newest(self, key: Hashable) -> tuple[Any, CachedAnswer] | None:
+        """The answer for `key`, of whichever version, and that version; None where none is there."""
+        with self._lock:
+            if key not in self._answers:
+                return None
+            self._answers.move_to_end(key)
+            return self._answers[key][:2]
+
+    def put(self, key: Hashable, version: Hashable, answer: CachedAnswer) -> None:
+        """Hold an answer that was made elsewhere, in place of what there was."""
+        with self._lock:
+            self._begun += 1
+            self._hold(key, version, answer, self._begun)
+
+    def answer(self, key: Hashable, version: Hashable, make: Callable[[], bytes | Page]) -> CachedAnswer:
+        """The answer for `key` and `version`, made by `make` where it is not there. All who wait get what that raises."""
+        with self._lock:
+            cached = self._current(key, version)
+            if cached is not None:
+                return cached
+            pending = self._making.get((key, version))
+            if pending is None:
+                mine = self._making[key, version] = Future()
+                self._begun += 1
+                begun = self._begun
+        if pending is not None:
+            return pending.result()
+        self._make(key, version, make, mine, begun)
+        return mine.result()
+
+    def _current(self, key: Hashable, version: Hashable) -> CachedAnswer | None:
+        cached_version, answer, _ = self._answers.get(key, (None, None, 0))
+        if answer is None or cached_version != version:
+            return None
+        self._answers.move_to_end(key)
+        return answer
+
+    def _make(
+        self,
+        key: Hashable,
+        version: Hashable,
+        make: Callable[[], bytes | Page],
+        pending: "Future[CachedAnswer]",
+        begun: int,
+    ) -> None:
+        try:
+            answer = CachedAnswer.of(make())
+        except BaseException as error:  # noqa: BLE001  (raised again for each who asked)
+            with self._lock:
+                del self._making[key, version]
+            pending.set_exception(error)
+            return  # who asked is told by `pending`, as all who wait are
+        with self._lock:
+            if key not in self._answers or self._answers[key][2] < begun:  # else a later version was quicker
+                self._hold(key, version, answer, begun)
+            del self._making[key, version]
+        pending.set_result(answer)
+
+    def _hold(self, key: Hashable, version: Hashable, answer: CachedAnswer, begun: int) -> None:
+        self._drop(key)
+        if answer.size <= self._most:
+            self._held += answer.size
+            self._answers[key] = version, answer, begun
+        while self._held > self._most:
+            oldest = next((name for name in self._answers if name not in self.pinned and name != key), None)
+            if oldest is None:
+                break
+            self._drop(oldest)
+
+    def _drop(self, key: Hashable) -> None:
+        if key in self._answers:
+            self._held -= self._answers.pop(key)[1].size
+
+
+#: What a worker returns: the revision that it computed the answer from, and the answer's bytes.
+Made = tuple[int, bytes]
+Compute = Callable[[bool], "Future[Made]"]
+_Making = asyncio.Task[tuple[int, CachedAnswer]]
+
+
+class Revalidation:
+    """Has a worker make the next answers that the cache holds by clutch and revision. Used from the event loop alone.
+
+    As stale-while-revalidate of RFC 5861: where the workers are idle, who asks waits a while for the newest answer; where
+    they have more to do, the last one is given at once. `Prefer: wait=SECONDS` waits in any case.
+
+    Of a key one may be made for those who wait and one for later, both at once: who waits does not wait for a renewal, which
+    yields to all others.
+    """
+
+    def __init__(self, cache: AnswerCache) -> None:
+        self._cache = cache
+        self._making: dict[Hashable, _Making] = {}
+        self._renewing: dict[Hashable, _Making] = {}
+
+    def knows(self, key: Hashable) -> bool:
+        """Whether an answer is held, of whichever revision, or is being made."""
+        return key in self._making or key in self._renewing or key in self._cache
+
+    def begin(self, key: Hashable, revision: int, body: bytes) -> None:
+        """Hold an answer that was made elsewhere, where none is known."""
+        if not self.knows(key):
+            self._cache.put(key, revision, CachedAnswer.of(body))
+
+    async def answer(self, key: Hashable, revision: int, compute: Compute, *, wait: float) -> tuple[int, CachedAnswer]:
+        """The answer at `revision` or later, or the last one where it is not there within `wait` [s]; and its revision.
+
+        Where none was ever made, it is waited for. `compute` is told whether who asks waits; what it raises is raised to
+        those who do.
+        """
+        deadline = asyncio.get_running_loop().time() + wait
+        newest = self._cache.newest(key)
+        while newest is None or newest[0] < revision:
+            making, renewing = self._making.get(key), self._renewing.get(key)
+            if newest is None:
+                newest = await asyncio.shield(making or self._begin(key, compute, waits=True))
+                continue
+            if making is None and (wait > 0 or renewing is None):
+                try:
+                    making = self._begin(key, compute, waits=wait > 0)
+                except BusyError:
+                    if wait > 0:
+                        raise
+                    break
+            left = deadline - asyncio.get_running_loop().time()
+            if making is None or left <= 0:
+                break
+            running = [task for task in (making, renewing) if task is not None]
+            ended, _ = await asyncio.wait(running, timeout=left, return_when=asyncio.FIRST_COMPLETED)
+            if not ended:
+                break
+            results = [task.result() for task in ended if task is making or not _failed(task)]
+            newest = max([newest, *results], key=lambda answered: answered[0])
+        return newest
+
+    def _begin(self, key: Hashable, compute: Compute, *, waits: bool) -> _Making:
+        """Have the next answer made, for one who waits or for later. Raises BusyError."""
+        tasks = self._making if waits else self._renewing
+        task = tasks[key] = asyncio.create_task(self._make(key, compute(waits), tasks))
+        self._cache.pinned.add(key)
+        task.add_done_callback(_logged)
+        return task
+
+    async def _make(
+        self, key: Hashable, computing: "Future[Made]", tasks: dict[Hashable, _Making]
+    ) -> tuple[int, CachedAnswer]:
+        try:
+            revision, body = await asyncio.wrap_future(computing)
+        finally:
+            del tasks[key]
+            if key not in self._making and key not in self._renewing:
+                self._cache.pinned.discard(key)
+        cached = self._cache.newest(key)
+        if cached is not None and revision < cached[0]:  # a later one was quicker
+            return cached
+        result = revision, CachedAnswer.of(body)
+        self._cache.put(key, *result)
+        return result
+
+
+def _failed(task: _Making) -> bool:
+    return task.cancelled() or task.exception() is not None
+
+
+def _logged(task: _Making) -> None:
+    """Log a failed renewal: the caller has already got the previous answer and does not see the error."""
+    if not task.cancelled() and task.exception() is not None:
+        _log.warning("an answer could not be computed again: %s", task.exception())

@@ -1,0 +1,71 @@
+"""`/inspections`: what was found on a clutch's friction surface, by cycles, and the files of its photographs."""
+
+import hashlib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from service import repository
+from service.errors import NotFoundError
+from service.paging import Part, by_cycles
+from service.repository import inspection, inspection_answers
+from storage import inspections
+from storage.engine.database import Database
+from storage.engine.errors import DamagedData
+from storage.inspections import PhotographRow
+
+COLUMNS = (
+    "inspection_id", "cycles", "performed_at", "lining", "roughness_um", "skewness", "note", "origin", "received_at",
+    "received_by", "state", "photographs",
+)  # fmt: skip
+
+
+def page(database: Database, clutch_id: str, part: Part) -> dict[str, Any]:
+    """Inspections by cycles. Raises NotFoundError."""
+    with database.reading() as connection:
+        repository.clutch(connection, clutch_id)
+        rows = inspections.page(connection, clutch_id, limit=part.most, after=part.after)
+        items = {item["inspection_id"]: item for item in inspection_answers(connection, rows)}
+    return part.of(rows, by_cycles("inspection_id"), lambda row: items[row.inspection_id])
+
+
+def rows(payload: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
+    for item in payload["items"]:
+        yield {name: item[name] for name in COLUMNS} | {"photographs": len(item["photographs"])}
+
+
+def look_up(database: Database, clutch_id: str, inspection_id: str) -> dict[str, Any]:
+    """One inspection. Raises NotFoundError."""
+    with database.reading() as connection:
+        repository.clutch(connection, clutch_id)
+        return inspection_answers(connection, [inspection(connection, clutch_id, inspection_id)])[0]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Photograph:
+    """The file of a photograph where it lies."""
+
+    database: Database
+    row: PhotographRow
+
+    def pieces(self, size: int) -> Iterator[bytes]:
+        """So many bytes of it at once, each read in a transaction of its own. Raises DamagedData, before the last piece,
+        where it is not what was sent."""
+        digest = hashlib.sha256()
+        for start in range(0, self.row.bytes, size):
+            with self.database.reading() as connection:
+                piece = inspections.piece(connection, self.row.sha256, start, size)
+            digest.update(piece)
+            if start + size >= self.row.bytes and digest.hexdigest() != self.row.sha256:
+                raise DamagedData(f"the photograph {self.row.sha256} is not what was sent")
+            yield piece
+
+
+def photograph(database: Database, clutch_id: str, inspection_id: str, photograph_id: str) -> Photograph:
+    """A photograph; its content is not read yet. Raises NotFoundError."""
+    with database.reading() as connection:
+        key = inspection(connection, clutch_id, inspection_id).inspection_key
+        for row in inspections.photographs(connection, [key])[key]:
+            if row.sha256 == photograph_id:
+                return Photograph(database=database, row=row)
+    raise NotFoundError(f"inspection {inspection_id!r} has no photograph {photograph_id!r}")

@@ -1,0 +1,31 @@
+"""`/v1/jobs`: what waits, runs and has ended, as it is answered."""
+
+from collections.abc import Collection
+from typing import Any
+
+from service.api.base import schema_fields
+from service.api.diagnosis import JobOut
+from service.errors import found
+from service.paging import Part, by_key
+from storage import jobs
+from storage.engine.database import Database
+from storage.jobs import JobRow
+
+
+def find(database: Database, job_id: str, *, only: Collection[str] | None) -> JobRow:
+    """The job, of one of `only` these clutches. Raises NotFoundError, too where it is another's."""
+    with database.reading() as connection:
+        return found(jobs.get(connection, job_id), "job", job_id, only=only)
+
+
+def page(database: Database, part: Part, *, state: str | None, only: Collection[str] | None) -> dict[str, Any]:
+    """Jobs in that state, of `only` these clutches, newest first."""
+    with database.reading() as connection:
+        rows = jobs.page(connection, limit=part.most, before=part.number, state=state, only=only)
+    return part.of(rows, by_key("job_key"), shown)
+
+
+def shown(row: JobRow) -> dict[str, Any]:
+    progress = dict(row.progress or {})
+    result = progress.pop("result", None)
+    return schema_fields(JobOut, row, progress=None if row.progress is None else progress, result=result)

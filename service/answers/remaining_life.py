@@ -1,0 +1,253 @@
+"""`/remaining-useful-life`: the stored prediction, or one computed for the requested quantity, criterion or earlier life."""
+
+import json
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+from sqlalchemy import Connection
+
+from service import repository
+from service.api.clutch import EndOfLifeIn
+from service.api.life import CriterionIn
+from service.clutch.assumptions import ALL_PRESSURES, MEAN_COF
+from service.clutch.condition import with_held_runs
+from service.clutch.items import ended, notice_items
+from service.clutch.notices import filters_disagree
+from service.clutch.quantities.ends import GIVEN, criteria_answer, criterion_end
+from service.clutch.quantities.measured import (
+    SLOPE_SPEEDS,
+    ChosenLife,
+    Family,
+    MeasuredLife,
+    chosen_life,
+    quantity_named,
+)
+from service.clutch.recomputation import ClutchHistory
+from service.clutch.tracking import CARRIED, predict_at
+from service.clutch.with_held import ClutchMeasurements, measured_life, with_held
+from service.errors import NotFoundError, unknown_clutch
+from storage import clutches, results
+from storage.engine.database import Database
+
+#: What `criteria_of` says of a clutch whose life ends by mean COF alone.
+NO_CRITERIA = b"[]"
+
+
+def criteria_of(database: Database, clutch_id: str) -> bytes:
+    """The criteria of a clutch's record as a JSON array, empty where mean COF alone counts. Raises NotFoundError."""
+    with database.reading() as connection:
+        row = clutches.get(connection, clutch_id)
+    if row is None:
+        raise unknown_clutch(clutch_id)
+    return json.dumps(row.record["end_of_life"].get("criteria", [])).encode()
+
+
+def remaining_life(
+    database: Database, clutch_id: str, method: str, pressure_bar: float | None, at_cycles: float | None
+) -> dict[str, Any]:
+    """The remaining useful life as it is now, or as it would have been predicted at `at_cycles`.
+
+    The carried filters' predictions over all pressures are stored; those of the exact filter and at one pressure are
+    computed. Raises NotFoundError for an unknown clutch or a pressure that its first stationary test did not measure.
+    """
+    with database.reading() as connection:
+        row = clutches.get(connection, clutch_id)
+        if row is None:
+            raise unknown_clutch(clutch_id)
+        stored, disagree = None, []
+        if pressure_bar is None:
+            stored = results.prediction_at(connection, clutch_id, method, ALL_PRESSURES, at_cycles)
+            disagree = _disagreement(connection, clutch_id, at_cycles)
+        carried_on = pressure_bar is None and at_cycles is None
+        now = at_cycles is None or at_cycles >= row.summary.get("as_of_cycles", math.inf)
+        earlier = not now and bool(row.summary.get("held"))
+        state = repository.state(connection, clutch_id, carried=carried_on) if stored is None or earlier else None
+    head = {"clutch_id": clutch_id, "method": method, "revision": row.revision, "origin": row.record["origin"]}
+    summary, count = row.summary if now else {}, row.summary.get("held", 0)
+    outlook_with_held = (summary.get("with_held") or {}).get(method)
+    if state is not None:
+        count = len(chosen_life(state, at_cycles=None if now else at_cycles).held)
+        outlook_with_held = (
+            _with_held(database, state, method, pressure_bar, None if now else at_cycles) if count else None
+        )
+    if stored is not None:
+        payload = stored.payload
+    elif state is None:
+        raise AssertionError("a prediction is stored, or the state was loaded")
+    else:
+        payload = _predicted(state, method, pressure_bar, at_cycles)
+    payload = {**payload, "warnings": [*payload["warnings"], *disagree]}
+    answer = head | payload | with_held_runs(payload, summary, outlook_with_held, count)
+    return answer | {"criteria": _criteria(payload)}
+
+
+def _disagreement(connection: Connection, clutch_id: str, at_cycles: float | None) -> list[dict[str, Any]]:
+    """The warning where the filters that are carried along a life disagree about the remaining life by mean COF."""
+    stored = {
+        method: results.prediction_at(connection, clutch_id, method, ALL_PRESSURES, at_cycles) for method in CARRIED
+    }
+    return notice_items(filters_disagree({method: row.payload for method, row in stored.items() if row is not None}))
+
+
+def _predicted(
+    state: ClutchHistory, method: str, pressure_bar: float | None, at_cycles: float | None
+) -> dict[str, Any]:
+    carried = (state.filters or {}).get(CARRIED[0])
+    return predict_at(
+        state.events,
+        state.assumptions(),
+        state.fraction,
+        method=method,
+        pressure_bar=pressure_bar,
+        at_cycles=at_cycles,
+        back_cast=None if carried is None else carried.back_cast,
+    )
+
+
+def _with_held(
+    database: Database, state: ClutchHistory, method: str, pressure_bar: float | None, at_cycles: float | None
+) -> dict[str, Any]:
+    """Compute the prediction that counts the held runs too."""
+    evidence = repository.evidence_for(database, state, repository.run_reader(database, state.clutch_id))
+    if evidence is None:
+        raise AssertionError("runs are held: the evidence was loaded")
+    return _predicted(with_held(state, evidence), method, pressure_bar, at_cycles)
+
+
+def _criteria(payload: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """The one criterion of a stored prediction, as `criteria` lists it: mean COF, which is surely the first."""
+    criterion, current = payload["criterion"], payload["current"]
+    fields = {name: criterion.get(name) for name in GIVEN}
+    return [
+        fields
+        | {"initial": criterion["initial_mean_cof"], "limit": criterion["threshold_mean_cof"]}
+        | {name: payload[name] for name in ("end_of_life_cycles", "remaining_cycles", "probability_of_reaching")}
+        | {"current": {"value": current["mean_cof"], "sd": current["mean_cof_sd"]}}
+        | {"probability_first": 1.0, "tests": payload["runs_used"]}
+    ]
+
+
+def rows(payload: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
+    held_runs = payload["held_runs"]
+    for quantile, remaining in payload["remaining_cycles"].items():
+        yield {
+            "as_of_cycles": payload["as_of_cycles"],
+            "status": payload["status"],
+            "quantile": quantile,
+            "remaining_cycles": remaining,
+            "end_of_life_cycles": payload["end_of_life_cycles"][quantile],
+            "at_least": payload["at_least"],
+            "held_runs": 0 if held_runs is None else held_runs["count"],
+            "remaining_cycles_with_held": None if held_runs is None else held_runs["remaining_cycles"][quantile],
+        }
+
+
+COLUMNS = (
+    "as_of_cycles", "status", "quantile", "remaining_cycles", "end_of_life_cycles", "at_least", "held_runs",
+    "remaining_cycles_with_held",
+)  # fmt: skip
+
+
+#: What is said of mean COF's course and of its forecasts, where another quantity is asked for.
+_NOT_OF_MEAN_COF: dict[str, Any] = {"course": None, "back_cast": None, "ended_lives": 0, "sample": None}
+
+
+def life_by_criteria(
+    database: Database,
+    clutch_id: str,
+    method: str,
+    pressure_bar: float | None = None,
+    at_cycles: float | None = None,
+    quantity: str | None = None,
+    criterion: str | None = None,
+    life: int | None = None,
+) -> dict[str, Any]:
+    """The remaining life by a clutch's criteria, by those of one `criterion`'s quantity, or by one `quantity` at a pressure.
+
+    As it was at `at_cycles`, of the present life or of an earlier one by its number. Raises NotFoundError, and InvalidError
+    for a quantity that is none.
+    """
+    with database.reading() as connection:
+        row = repository.clutch(connection, clutch_id)
+        state = repository.state(connection, clutch_id)
+        evidence = repository.evidence(connection, clutch_id)
+        plain = quantity is None and life is None and pressure_bar is None
+        disagree = _disagreement(connection, clutch_id, at_cycles) if plain else []
+    by_criteria = partial(
+        _by_criteria, method=method, quantity=quantity, criterion=criterion, pressure_bar=pressure_bar
+    )
+    chosen = chosen_life(state, life, at_cycles)
+    answer = by_criteria(state, chosen, evidence)
+    answer["warnings"] = [*answer["warnings"], *disagree]
+    now = chosen.number == chosen.of and (at_cycles is None or at_cycles >= row.summary.get("as_of_cycles", math.inf))
+    answer_with_held = None
+    if chosen.held:
+        evidence = replace(evidence, reader=repository.run_reader(database, clutch_id))
+        state_with_held = with_held(state, evidence)
+        chosen_with_held = chosen_life(state_with_held, life, None if now else at_cycles)
+        answer_with_held = by_criteria(state_with_held, chosen_with_held, evidence)
+    head = {"clutch_id": clutch_id, "method": method, "revision": row.revision, "origin": state.record.origin}
+    return head | answer | with_held_runs(answer, row.summary if now else {}, answer_with_held, len(chosen.held))
+
+
+def _by_criteria(
+    state: ClutchHistory,
+    chosen: ChosenLife,
+    evidence: ClutchMeasurements,
+    *,
+    method: str,
+    quantity: str | None,
+    criterion: str | None,
+    pressure_bar: float | None,
+) -> dict[str, Any]:
+    events = () if chosen.life is None else chosen.life.events
+    by_mean_cof = predict_at(events, chosen.assumptions, state.fraction, method=method)
+    answer = by_mean_cof | {"life": chosen.item(), "criteria": []}
+    measured = measured_life(state, chosen, evidence)
+    if measured is None:
+        return answer
+    requested = _requested_criteria(state.record.end_of_life, measured, quantity, criterion, pressure_bar)
+    if all(criterion_in.quantity != MEAN_COF for criterion_in in requested):
+        answer |= _NOT_OF_MEAN_COF
+    ends = [criterion_end(measured, criterion_in, method) for criterion_in in requested]
+    return ended(answer | criteria_answer(measured, ends, answer["current"]), measured.life.end)
+
+
+def _requested_criteria(
+    record: EndOfLifeIn, measured: MeasuredLife, quantity: str | None, criterion: str | None, pressure_bar: float | None
+) -> Sequence[CriterionIn]:
+    of_clutch = record.criteria or (CriterionIn(quantity="mean_cof", fraction=record.cof_fraction),)
+    if quantity is None and criterion is None and pressure_bar is None:
+        return of_clutch
+    name = quantity_named(quantity or criterion or MEAN_COF).name
+    chosen = [
+        candidate
+        for candidate in of_clutch
+        if candidate.quantity == name and pressure_bar in (None, candidate.pressure_bar)
+    ]
+    if chosen:
+        return chosen
+    if criterion is not None:
+        raise NotFoundError(
+            f"the clutch has no criterion on {name}; it has: {', '.join(candidate.quantity for candidate in of_clutch)}"
+        )
+    return [_usual(name, record.cof_fraction, measured, pressure_bar)]
+
+
+def _usual(name: str, fraction: float, measured: MeasuredLife, pressure_bar: float | None) -> CriterionIn:
+    """What would end a life by a quantity that its clutch has no criterion on: its fraction, of a slope 0; at the lowest
+    pressure and frequency where it is measured, unless one is given."""
+    quantity = quantity_named(name)
+    tracks = measured.series(quantity)
+    if not tracks:
+        raise NotFoundError(f"{name} is not measured in this life")
+    first = min(tracks, key=lambda series: (series.frequency_hz or 0.0, series.pressure))
+    fields: dict[str, Any] = {"quantity": name, "pressure_bar": pressure_bar}
+    if pressure_bar is None and first.pressure != ALL_PRESSURES:
+        fields["pressure_bar"] = first.pressure / 1e5
+    if quantity.family is Family.SLOPE:
+        return CriterionIn(**fields, speed_rpm=SLOPE_SPEEDS[1])
+    return CriterionIn(**fields, fraction=fraction, frequency_hz=first.frequency_hz)

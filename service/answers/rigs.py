@@ -1,0 +1,249 @@
+"""`/v1/rigs`: rig profiles in force, by name; `/v1/import/preview`: a file as it would be read and evaluated by one."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from models.arrays import FloatArray
+from models.clutch import Geometry
+from models.records.decimation import extreme_rows
+from models.records.plateaus import cut_plateaus
+from models.records.pressure_levels import pressure_stretches
+from service import repository
+from service.api.clutch import ClutchIn
+from service.api.rig import RigOut, RigProfile
+from service.channels import CHANNELS, RADIANS_PER_SECOND_PER_RPM, bar
+from service.clutch.analysis import analyse
+from service.clutch.incoming_run import IncomingRun, SampledChannels
+from service.clutch.items import fit_items, notice_items
+from service.errors import InvalidError
+from service.paging import Part, by_name
+from service.readers.read_file import preview_file, read_file
+from service.readers.table import Reading
+from service.readers.unit_table import spellings
+from service.runs.rig_profile import Named, fits, named, pattern_for
+from service.runs.upload import NEEDED, reading_with, run_of
+from storage import clutches, rigs
+from storage.engine.database import Database
+
+#: Samples of each channel that are answered. Chosen: twice the pixels of a plot's width.
+_POINTS = 2000
+
+
+def page(database: Database, part: Part) -> dict[str, Any]:
+    """Profiles by name, fewer where so many would be too much memory."""
+    part = replace(part, limit=min(part.limit, rigs.MAX_AT_ONCE))
+    with database.reading() as connection:
+        rows = rigs.page(connection, limit=part.most, after=part.name)
+    return part.of(rows, by_name("name"), lambda row: repository.rig_out(row).model_dump(mode="json"))
+
+
+def look_up(database: Database, name: str) -> dict[str, Any]:
+    """One profile as it is answered. Raises NotFoundError."""
+    return rig_profile(database, name).model_dump(mode="json")
+
+
+def rig_profile(database: Database, name: str) -> RigOut:
+    """One profile. Raises NotFoundError."""
+    with database.reading() as connection:
+        return repository.rig(connection, name)
+
+
+def preview(
+    database: Database,
+    path: Path,
+    *,
+    filename: str,
+    rig: str | None,
+    profile: RigProfile | None,
+    kind: str | None,
+    cycles: float | None,
+    clutch_id: str | None,
+    reading: Reading,
+) -> dict[str, Any]:
+    """What would be made of a file by `profile`, by that of `rig`, or by the one whose columns it has; else by its titles.
+    What `reading` says of columns, decimal sign and missing values comes before either.
+
+    `clutch_id`: the clutch whose geometry and torque filter evaluate it, where it is registered already. Raises InvalidError
+    or TooLargeError where no table is found, NotFoundError where the rig is unknown.
+    """
+    geometry, torque_filter = _clutch(database, clutch_id)
+    if profile is None and rig is not None:
+        profile = rig_profile(database, rig)
+    shown = preview_file(path, filename=filename, reading=reading_with(profile, reading))
+    if profile is None:
+        rig, profile = _fitting(database, shown, filename)
+        shown = preview_file(path, filename=filename, reading=reading_with(profile, reading)) if profile else shown
+    from_profile = Named() if profile is None else named(profile, filename, shown["labels"])
+    used = _by_titles(shown) if profile is None else profile
+    if used is not None:
+        stated = {name: value for name in ("decimal", "missing") if (value := getattr(reading, name))}
+        used = used.model_copy(update=stated)
+        if reading.mapping and (titled := _by_titles(shown)):
+            used = used.model_copy(update={"columns": titled.columns})
+    kind, cycles = kind or from_profile.kind, from_profile.cycles if cycles is None else cycles
+    by_titles = profile is None and shown["problem"] is None  # as a push reads it; else with what is open left open
+    read_by = reading_with(None if by_titles else used, reading if by_titles else Reading())
+    evaluated = _evaluated(path, filename, None if used is None else read_by, kind, geometry, torque_filter)
+    kind = kind or (evaluated["kinds"][0] if len(evaluated["kinds"]) == 1 else None)
+    usable = _first_of_each(shown["columns"])
+    columns = [_column(shown["columns"][index], used) for index in usable]
+    return {
+        "filename": filename,
+        "above": shown["above"],
+        "tables": shown["tables"],
+        "columns": columns,
+        "first_rows": [[row[index] if index < len(row) else "" for index in usable] for row in shown["head"]],
+        "units": {name: spellings(name).split(", ") for name in CHANNELS},
+        "rig": rig,
+        "profile": _saveable([column["title"] for column in columns], used, kind, filename, cycles),
+        "kind": kind,
+        "cycles": cycles,
+        "run_id": from_profile.run_id,
+        **evaluated,
+        "missing": [
+            *evaluated["missing"],
+            *(f"unit of {column['title']}" for column in columns if column["channel"] and not column["unit"]),
+            *(["kind"] if kind is None else []),
+            *(["cycles"] if cycles is None else []),
+        ],
+    }
+
+
+def _clutch(database: Database, clutch_id: str | None) -> tuple[Geometry, float]:
+    with database.reading() as connection:
+        row = None if clutch_id is None else clutches.get(connection, clutch_id)
+    record = ClutchIn(clutch_id="any") if row is None else repository.record(row)
+    return record.geometry.to_model(), record.torque_filter
+
+
+def _title(column: Mapping[str, Any]) -> str:
+    return f"{column['group']}/{column['name']}" if column["group"] else str(column["name"])
+
+
+def _first_of_each(columns: Sequence[Mapping[str, Any]]) -> list[int]:
+    """The indices of columns that have a title, the first of those of equal titles."""
+    titles = [_title(column) if column["name"] else "" for column in columns]
+    return [index for index, title in enumerate(titles) if title and titles.index(title) == index]
+
+
+def _fitting(database: Database, shown: Mapping[str, Any], filename: str) -> tuple[str | None, RigProfile | None]:
+    """The one profile that has the file's columns; of several, the one whose pattern has the file's name."""
+    titles = [_title(column) for column in shown["columns"] if column["name"]]
+    with database.reading() as connection:
+        fitting = [repository.rig_out(row) for row in rigs.every(connection) if fits(row.content, titles)]
+    if len(fitting) > 1:
+        # a name that says nothing leaves the profile's own kind
+        fitting = [
+            profile
+            for profile in fitting
+            if profile.file_name and named(profile, filename, {}) != Named(kind=profile.kind)
+        ]
+    return (fitting[0].name, fitting[0]) if len(fitting) == 1 else (None, None)
+
+
+def _by_titles(shown: Mapping[str, Any]) -> RigProfile | None:
+    """The columns as their titles name them; None where no title is a channel's. A channel of two columns is left open."""
+    channels = [column["channel"] for column in shown["columns"]]
+    columns: dict[str, dict[str, Any]] = {}
+    for column, channel in zip(shown["columns"], channels, strict=True):
+        if column["name"]:
+            only = channel is not None and channels.count(channel) == 1
+            entry = {"channel": channel, "unit": column["stated"]} if only else {"channel": None}
+            columns.setdefault(_title(column), {"title": _title(column)} | entry)
+    if not any(column["channel"] for column in columns.values()):
+        return None
+    return RigProfile.model_validate({"columns": list(columns.values())})
+
+
+def _column(column: Mapping[str, Any], profile: RigProfile | None) -> dict[str, Any]:
+    title = _title(column)
+    profile_column = next((item for item in profile.columns if item.title == title), None) if profile else None
+    channel = None if profile_column is None else profile_column.channel
+    return {
+        "title": title,
+        "stated_unit": column["unit"],
+        "unit": column["read_in"] if channel == column["channel"] else None,
+        "channel": channel,
+        "in_part": channel is not None and column["in_part"],
+        "scale": 1.0 if profile_column is None else profile_column.scale,
+        "offset": 0.0 if profile_column is None else profile_column.offset,
+    }
+
+
+def _saveable(
+    titles: Sequence[str], used: RigProfile | None, kind: str | None, filename: str, cycles: float | None
+) -> dict[str, Any]:
+    """The profile as it could be saved: with all columns, and a pattern of the file's name where the cycles are in that."""
+    profile_columns = {column.title: column.model_dump(mode="json") for column in used.columns} if used else {}
+    profile_fields = {} if used is None else used.model_dump(mode="json")
+    suggested = {
+        "file_name": profile_fields.get("file_name") or pattern_for(filename, cycles),
+        "kind": profile_fields.get("kind") or kind,
+    }
+    columns = [profile_columns.get(title, {"title": title, "channel": None}) for title in titles]
+    fields = profile_fields | suggested | {"columns": columns}
+    return {name: value for name, value in fields.items() if name in RigProfile.model_fields}
+
+
+def _evaluated(
+    path: Path, filename: str, reading: Reading | None, kind: str | None, geometry: Geometry, torque_filter: float
+) -> dict[str, Any]:
+    """The channels, what is cut of them and what is fitted; `problem` says why the file would be refused."""
+    answer: dict[str, Any] = {
+        "rows": 0, "kinds": [], "missing": [], "channels": {}, "pieces": [], "fits": [], "warnings": [], "problem": None,
+    }  # fmt: skip
+    if reading is None:
+        return answer | {"missing": list(NEEDED["stationary_stribeck"])}
+    try:
+        read = read_file(path, filename=filename, reading=reading)
+        columns, samples = read.columns, max(column.size for column in read.columns.values())
+        answer |= {
+            "rows": samples,
+            "channels": _drawn(columns, samples),
+            "kinds": [name for name, needed in NEEDED.items() if columns.keys() >= set(needed)],
+            "missing": [name for name in NEEDED[kind or "stationary_stribeck"] if name not in columns],
+            "warnings": notice_items(read.notices),
+        }
+        kind = kind or (answer["kinds"][0] if len(answer["kinds"]) == 1 else None)
+        if kind is None or answer["missing"]:
+            return answer
+        run = run_of(read, IncomingRun(kind=kind, cycles=0.0, run_id=""))
+        analysis = analyse(run, geometry, torque_filter)
+        return answer | {
+            "pieces": _pieces(run, torque_filter),
+            "fits": fit_items(analysis.fits, {}),
+            "warnings": [*(run.file or {})["warnings"], *notice_items(analysis.warnings)],
+        }
+    except InvalidError as error:
+        return answer | {"problem": error.detail}
+
+
+def _drawn(columns: Mapping[str, FloatArray], samples: int) -> dict[str, list[float]]:
+    if samples > _POINTS:
+        rows = extreme_rows(columns.values(), len(columns), samples=samples, points=_POINTS)
+        columns = {name: column[rows] for name, column in columns.items()}
+    return {name: column.tolist() for name, column in columns.items()}
+
+
+def _pieces(run: IncomingRun, torque_filter: float) -> list[dict[str, Any]]:
+    """The plateaus of a sampled stationary test, or the stretches of constant pressure of a dynamic one."""
+    if "time_s" not in run.channels:
+        return []
+    record = SampledChannels(run.channels)
+    if run.kind == "stationary_stribeck":
+        cut = cut_plateaus(record, torque_filter)
+        speeds: Sequence[float | None] = (cut.plateaus.speed / RADIANS_PER_SECOND_PER_RPM).tolist()
+        plateaus = zip(cut.start.tolist(), cut.stop.tolist(), cut.plateaus.pressure.tolist(), speeds, strict=True)
+        return [_piece(*piece) for piece in plateaus]
+    order = np.argsort(record.time, kind="stable")
+    time = record.time[order]
+    stretches = pressure_stretches(time, record.pressure[order])
+    return [_piece(float(time[s.start]), float(time[s.stop - 1]), s.pressure, None) for s in stretches]
+
+
+def _piece(start: float, stop: float, pressure: float, speed: float | None) -> dict[str, Any]:
+    return {"start_s": start, "stop_s": stop, "pressure_bar": bar(pressure), "speed_rpm": speed}

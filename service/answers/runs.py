@@ -1,0 +1,71 @@
+"""`/runs` and `/loops`: receipts by cycles, and the friction loops of the dynamic tests."""
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from service import repository
+from service.channels import whole
+from service.clutch.condition import held_runs_left_out
+from service.clutch.timeline import DYNAMIC
+from service.paging import Part, by_cycles, by_key, page_as_bytes
+from storage import changes, runs
+from storage.encoding import to_text
+from storage.engine.database import Database
+
+COLUMNS = (
+    "run_id", "kind", "cycles", "started_at", "received_at", "origin", "content_sha256", "warnings", "fits", "state",
+    "sent_cycles",
+)  # fmt: skip
+TRAIL_COLUMNS = changes.SHOWN
+
+
+def page_as_json(
+    database: Database, clutch_id: str, part: Part, state: str | None = None, kind: str | None = None
+) -> bytes:
+    """Receipts by cycles, of runs in one state or all, of one kind or all, as JSON. Raises NotFoundError.
+
+    A receipt's text goes out as it is stored, and what the run is now behind it.
+    """
+    with database.reading() as connection:
+        repository.clutch(connection, clutch_id)
+        rows = runs.receipts(connection, clutch_id, limit=part.most, after=part.after, state=state, kind=kind)
+    return page_as_bytes([_as_json(row) for row in rows[: part.limit]], part.next(rows, by_cycles("run_id")))
+
+
+def _as_json(row: runs.ReceiptRow) -> bytes:
+    sent_cycles = row.cycles if row.sent_cycles is None else row.sent_cycles
+    present = f'"state":"{row.state}","doubts":{row.doubts},"sent_cycles":{whole(sent_cycles)},'
+    present += f'"received_by":{to_text(row.received_by)}'
+    return f"{row.receipt[:-1]},{present}}}".encode()
+
+
+def rows(payload: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
+    """Receipts as rows of a table, with the number of warnings and fits."""
+    for item in payload["items"]:
+        counted = {name: len(item[name]) for name in ("warnings", "fits")}
+        yield {name: item[name] for name in COLUMNS} | counted
+
+
+def trail(database: Database, clutch_id: str, part: Part) -> dict[str, Any]:
+    """The audit trail of a clutch and its runs, newest first. Raises NotFoundError."""
+    with database.reading() as connection:
+        repository.clutch(connection, clutch_id)
+        rows = changes.page(connection, clutch_id, limit=part.most, before=part.number)
+    return part.of(rows, by_key("change_key"), changes.ChangeRow.entry)
+
+
+def trail_rows(payload: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
+    for item in payload["items"]:
+        yield {name: item[name] for name in TRAIL_COLUMNS} | {name: to_text(item[name]) for name in ("before", "after")}
+
+
+def loops(database: Database, clutch_id: str, part: Part) -> dict[str, Any]:
+    """Friction loops by cycles and pressure. Raises NotFoundError."""
+    with database.reading() as connection:
+        repository.clutch(connection, clutch_id)
+        rows = runs.page(connection, clutch_id, kind=DYNAMIC, state=runs.ACCEPTED)
+        held_count = runs.held(connection, [clutch_id]).get(clutch_id, 0)
+    items = [
+        {"run_id": row.run_id, "cycles": whole(row.cycles)} | loop for row in rows for loop in row.receipt["loops"]
+    ]
+    return held_runs_left_out(held_count) | part.sliced(items)

@@ -1,0 +1,292 @@
+"""What is stored, held against itself: nothing is changed. Findings are sentences, none where all is as it should be.
+
+Rows are held against their checksums; runs, inspections and photographs against the hashes that their senders were given;
+fits, receipts and predictions against what is computed again from the runs.
+"""
+
+import hashlib
+import json
+import math
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import sqlalchemy as sa
+from sqlalchemy import Connection
+
+from service import repository
+from service.channels import bar
+from service.clutch.assumptions import ALL_PRESSURES
+from service.clutch.recomputation import Results
+from service.clutch.tracking import CARRIED
+from service.errors import InvalidError
+from service.repository import content_now, decoded, inspection_hash
+from service.settings import CODE_VERSION
+from storage import checksums, inspections, raw_columns, results, runs
+from storage.checksums import allow_damage
+from storage.encoding import to_text
+from storage.engine.database import Database
+from storage.engine.errors import DamagedData, StorageError
+from storage.inspections import InspectionRow, PhotographRow
+from storage.raw_columns import Stored
+from storage.runs import RunRow
+from storage.tables import CHECKSUM, metadata, run
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Checked:
+    """What was found, a sentence each; how many runs, inspections and photographs were checked; and how many results earlier
+    releases made, by release: these are only recomputed."""
+
+    findings: tuple[str, ...]
+    runs: int = 0
+    inspections: int = 0
+    photographs: int = 0
+    earlier: Mapping[str, int] = field(default_factory=dict)
+
+
+def check(database: Database, clutch_id: str, *, recompute: bool) -> Checked:
+    """All of a clutch; its results computed again where asked for, and where all that they follow from is whole.
+
+    Whatever a damaged value leads to is a finding: the next clutch is to be checked too.
+    """
+    content = _Sum()
+    for part in (check_rows, check_runs, check_inspections):
+        content.add(_finished(part, database, clutch_id))
+    if recompute and not content.findings:
+        content.add(_finished(check_results, database, clutch_id))
+    return Checked(**vars(content))
+
+
+class _Sum:
+    """What several checks have found."""
+
+    def __init__(self) -> None:
+        self.findings: tuple[str, ...] = ()
+        self.runs = self.inspections = self.photographs = 0
+        self.earlier: Counter[str] = Counter()
+
+    def add(self, checked: Checked) -> None:
+        self.findings += checked.findings
+        self.runs += checked.runs
+        self.inspections += checked.inspections
+        self.photographs += checked.photographs
+        self.earlier.update(checked.earlier)
+
+
+def _finished(part: Callable[[Database, str], Checked], database: Database, clutch_id: str) -> Checked:
+    try:
+        return part(database, clutch_id)
+    except Exception as error:  # noqa: BLE001  (a damaged value may lead to any)
+        return Checked(findings=(f"{clutch_id}: cannot be checked: {type(error).__name__}: {error}",))
+
+
+def check_rows(database: Database, clutch_id: str) -> Checked:
+    """Every row of a clutch against its checksum."""
+    with database.reading() as connection:
+        found = _unreadable(connection, {table: _of_clutch(table, clutch_id) for table in _tables(of_clutches=True)})
+    return Checked(findings=tuple(f"{clutch_id}: {finding}" for finding in found))
+
+
+def check_other_rows(database: Database) -> Checked:
+    """Every row that is of no clutch against its checksum: priors of fleets, rig profiles, rules and receivers of alarms."""
+    with database.reading() as connection:
+        found = _unreadable(connection, {table: sa.true() for table in _tables(of_clutches=False)})
+    return Checked(findings=tuple(found))
+
+
+def _unreadable(connection: Connection, chosen: Mapping[sa.Table, sa.ColumnElement[bool]]) -> list[str]:
+    found = []
+    for table, rows in chosen.items():
+        try:
+            found += checksums.findings(connection, table, rows)
+        except (StorageError, sa.exc.DBAPIError) as error:
+            found.append(f"a row of {table.name} cannot be read: {error}")
+    return found
+
+
+def _tables(*, of_clutches: bool) -> list[sa.Table]:
+    """The tables that have checksums; a rule of alarms may be of no clutch."""
+    sealed = [table for table in metadata.sorted_tables if CHECKSUM in table.c]
+    return [
+        t for t in sealed if (t.name != "alarm" and bool({"clutch_id", "run_key"} & set(t.c.keys()))) is of_clutches
+    ]
+
+
+def _of_clutch(table: sa.Table, clutch_id: str) -> sa.ColumnElement[bool]:
+    if "clutch_id" in table.c:
+        return table.c.clutch_id == clutch_id
+    return table.c.run_key.in_(sa.select(run.c.run_key).where(run.c.clutch_id == clutch_id))
+
+
+def check_runs(database: Database, clutch_id: str) -> Checked:
+    """Every run of a clutch against the hash that its sender was given; one run in memory at a time."""
+    with database.reading() as connection:
+        allow_damage(connection, everywhere=True)  # `check_rows` finds it
+        rows = runs.page(connection, clutch_id)
+    findings = [finding for row in rows if (finding := _finding(database, row)) is not None]
+    return Checked(runs=len(rows), findings=tuple(f"{clutch_id}: {finding}" for finding in findings))
+
+
+def _finding(database: Database, row: RunRow) -> str | None:
+    try:
+        with database.reading() as connection:
+            columns = raw_columns.stored_of_run(connection, row.run_key)
+            stored_file = raw_columns.file_of(connection, row.run_key)
+        sent = decoded(row, columns)
+    except DamagedData as error:
+        return str(error)
+    sha256, file = content_now(row, sent), row.details.get("file")
+    if file is not None:
+        finding = _file_finding(stored_file, row.run_id, file["sha256"])
+        if finding is not None:
+            return finding
+    if not sha256 == row.content_sha256 == row.receipt["content_sha256"]:
+        return (
+            f"run {row.run_id} differs from what was sent. sha256 of its content: now {sha256}, "
+            f"when stored {row.content_sha256}, in the receipt {row.receipt['content_sha256']}"
+        )
+    return None
+
+
+def _file_finding(file: Stored | None, run_id: str, wanted: str) -> str | None:
+    try:
+        sha256 = "none" if file is None else file.copy_to(None)
+    except DamagedData as error:
+        return f"run {run_id} is damaged: {error}"
+    if sha256 == wanted:
+        return None
+    return f"the file of run {run_id} differs from what was sent: its sha256 is {sha256}, the stored one is {wanted}"
+
+
+#: Relative difference of two numbers that are the same result. Chosen: libraries of linear algebra differ by 1e-12 among
+#: processors, and a filter of a hundred steps multiplies that.
+_SAME = 1e-6
+#: Findings that are listed of a clutch. Chosen: the first ones tell, and all runs follow from a wrong one.
+_MAX_LISTED = 10
+
+#: Results by what they are of: a run's receipt, its fits, a prediction.
+_Results = Mapping[str, tuple[str, Any]]
+
+
+def check_results(database: Database, clutch_id: str) -> Checked:
+    """All results of a clutch computed again and compared; those of earlier releases need not be the same."""
+    while True:
+        with database.reading() as connection:
+            state = repository.state(connection, clutch_id)
+            stored = _stored(connection, clutch_id)
+        try:
+            recomputed = _recomputed(repository.recomputed(repository.recorded(database, state)))
+        except (InvalidError, DamagedData) as error:
+            return Checked(findings=(f"{clutch_id}: results cannot be computed again: {error}",))
+        with database.reading() as connection:
+            if repository.unchanged(connection, clutch_id, state.revision):
+                return _compared(clutch_id, stored, recomputed)
+
+
+def _compared(clutch_id: str, stored: _Results, again: Mapping[str, Any]) -> Checked:
+    earlier = Counter(version for version, _ in stored.values() if version != CODE_VERSION)
+    lines = [f"{name} is stored, but the runs do not give it" for name in stored.keys() - again.keys()]
+    lines += [f"{name} is missing, although the runs give it" for name in again.keys() - stored.keys()]
+    for name in stored.keys() & again.keys():
+        version, result = stored[name]
+        place = _difference(result, again[name]) if version == CODE_VERSION else None
+        if place is not None:
+            lines.append(f"{name} differs when it is computed again: {place}")
+    lines = sorted(lines) if not earlier else sorted(line for line in lines if "differs" in line)
+    more = [f"and {len(lines) - _MAX_LISTED} more"] if len(lines) > _MAX_LISTED else []
+    findings = tuple(f"{clutch_id}: {line}" for line in [*lines[:_MAX_LISTED], *more])
+    return Checked(findings=findings, earlier=earlier)
+
+
+def _stored(connection: Connection, clutch_id: str) -> _Results:
+    rows = runs.page(connection, clutch_id)
+    fits = results.fits_of(connection, clutch_id)
+    named = {f"the receipt of run {row.run_id}": (row.code_version, row.receipt) for row in rows}
+    for row in rows:
+        stored_fits = fits.get(row.run_key, [])
+        named |= {_fit(row.run_id, fit.pressure): (fit.code_version, _plain(asdict(fit))) for fit in stored_fits}
+    for method in CARRIED:
+        predictions = results.predictions_of(connection, clutch_id, method, ALL_PRESSURES)
+        named |= {_prediction(method, item.cycles): (item.code_version, item.payload) for item in predictions}
+    return named
+
+
+def _recomputed(computed: Results) -> dict[str, Any]:
+    named = {f"the receipt of run {run_id}": _plain(receipt) for run_id, receipt in computed.receipts.items()}
+    for run_id, levels in computed.levels.items():
+        rows = repository.fit_rows(levels, computed.cofs.get(run_id, {}))
+        named |= {_fit(run_id, row.pressure): _plain(asdict(row)) for row in rows}
+    if computed.tracking is not None:
+        for item in computed.tracking.predictions:
+            named[_prediction(item.method, item.cycles)] = _plain(item.payload)
+    return named
+
+
+def _fit(run_id: str, pressure: float) -> str:
+    return f"the fit of run {run_id} at {bar(pressure):g} bar"
+
+
+def _prediction(method: str, cycles: float) -> str:
+    return f"the prediction by {method} at {cycles:g} cycles"
+
+
+def _plain(result: Any) -> Any:
+    """As it is after it has been stored."""
+    return json.loads(to_text(result))
+
+
+def _difference(stored: Any, again: Any, place: str = "") -> str | None:
+    """The first place where two results differ by more than the last digits, with both values; None where none does."""
+    if isinstance(stored, dict) and isinstance(again, dict) and stored.keys() == again.keys():
+        pairs = [(stored[name], again[name], f"{place}/{name}") for name in stored]
+    elif isinstance(stored, list) and isinstance(again, list) and len(stored) == len(again):
+        pairs = [(*both, f"{place}/{index}") for index, both in enumerate(zip(stored, again, strict=True))]
+    elif _are_numbers(stored, again) and math.isclose(stored, again, rel_tol=_SAME):
+        return None
+    else:
+        return None if stored == again else f"{place or '/'} is {str(stored)[:80]}, computed again {str(again)[:80]}"
+    return next((other for pair in pairs if (other := _difference(*pair)) is not None), None)
+
+
+def _are_numbers(*values: Any) -> bool:
+    return all(isinstance(value, (int, float)) and not isinstance(value, bool) for value in values)
+
+
+def check_inspections(database: Database, clutch_id: str) -> Checked:
+    """Every inspection of a clutch and every photograph of it against its hash; one photograph in memory at a time."""
+    with database.reading() as connection:
+        allow_damage(connection, everywhere=True)
+        rows = inspections.page(connection, clutch_id)
+        of_keys = inspections.photographs(connection, [row.inspection_key for row in rows])
+    photographs = [(row, photograph) for row in rows for photograph in of_keys[row.inspection_key]]
+    findings = [finding for row in rows if (finding := _inspection_finding(row)) is not None]
+    findings += [finding for pair in photographs if (finding := _photograph_finding(database, *pair)) is not None]
+    return Checked(
+        inspections=len(rows),
+        photographs=len(photographs),
+        findings=tuple(f"{clutch_id}: {finding}" for finding in findings),
+    )
+
+
+def _inspection_finding(row: InspectionRow) -> str | None:
+    sha256 = inspection_hash(row.content)
+    if sha256 == row.content_sha256 and row.cycles == row.content["cycles"]:
+        return None
+    return (
+        f"inspection {row.inspection_id} (stored at {row.cycles:g} cycles) differs from what was sent. "
+        f"sha256 of its content: now {sha256}, when stored {row.content_sha256}"
+    )
+
+
+def _photograph_finding(database: Database, row: InspectionRow, photograph: PhotographRow) -> str | None:
+    with database.reading() as connection:
+        data = inspections.data(connection, row.inspection_key, photograph.sha256)
+    sha256 = hashlib.sha256(data or b"").hexdigest()
+    if sha256 == photograph.sha256:
+        return None
+    return (
+        f"photograph {photograph.sha256} of inspection {row.inspection_id} differs from what was sent: "
+        f"the sha256 is now {sha256}"
+    )

@@ -1,0 +1,157 @@
+"""Rig profiles: how the files that a rig's recorder writes are read; and the preview of a file before it is sent."""
+
+from collections import Counter
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, StringConstraints, model_validator
+
+from service.api import base
+from service.api.base import Answer, Identifier, Schema, page_of
+from service.api.run import Fit, Warned
+
+FileKindName = Literal["stationary_stribeck", "dynamic_stribeck"]
+ChannelName = Literal[
+    "time_s", "pressure_bar", "speed_rpm", "torque_nm", "torque_sd_nm", "oil_temperature_c",
+    "plate_temperature_front_c", "plate_temperature_rear_c",
+]  # fmt: skip
+Text = Annotated[str, StringConstraints(min_length=1, max_length=base.LONGEST_NAME)]
+Number = Annotated[float, Field(ge=-base.LARGEST_NUMBER, le=base.LARGEST_NUMBER, allow_inf_nan=False)]
+
+
+class RigColumn(Schema):
+    """One column of the rig's files: a channel, or a column to ignore."""
+
+    title: Annotated[str, StringConstraints(min_length=1, max_length=base.LONGEST_TITLE)] = Field(
+        description="Its title in the file, without the unit; `group/title` in files with groups"
+    )
+    channel: ChannelName | None = Field(default=None, description="The channel; null: ignore the column")
+    unit: Text | None = Field(default=None, description="Its unit; null: the unit in the file")
+    stated: Text | None = Field(
+        default=None, description="What the file writes instead of `unit`; any other unit in the file is refused"
+    )
+    scale: Number = Field(
+        default=1.0, description="Channel = `scale` · value + `offset`, all in the channel's unit; not 0"
+    )
+    offset: Number = Field(default=0.0, description="Added after scaling, in the channel's unit; corrects a zero shift")
+
+    @model_validator(mode="after")
+    def _scaled(self) -> Self:
+        if self.scale == 0:
+            raise ValueError("scale must not be 0")
+        return self
+
+
+class RigProfile(Schema):
+    """How the files of a rig are read. Arguments of a request override it."""
+
+    columns: list[RigColumn] = Field(
+        min_length=1, max_length=base.MAX_COLUMNS, description="The columns by their titles; others are ignored"
+    )
+    decimal: Literal[".", ","] | None = Field(
+        default=None,
+        description="The decimal sign of text files; the other sign then separates thousands; null: detected",
+    )
+    table: Text | None = Field(
+        default=None,
+        description="The sheet, group or test of a file with several, by name or number from 1; null: the only one",
+    )
+    skip_rows: Annotated[int, Field(ge=0, le=base.MAX_SKIPPED)] = Field(
+        default=0, description="Number of lines above the titles to skip"
+    )
+    missing: Text | None = Field(
+        default=None,
+        description="Marks of missing values, such as `-9999,n/a`: rows with one, or with an empty cell, are left"
+        " out; `none`: all numbers are measurements; null: a file with suspicious numbers is refused",
+    )
+    kind: FileKindName | None = Field(
+        default=None, description="The kind of run; null: from `file_name` or from the request"
+    )
+    file_name: Text | None = Field(
+        default=None,
+        description="Pattern of the file's name: `{cycles}`, `{kind}`, `{run_id}` and `*` stand for the parts that change",
+    )
+    kinds: dict[Text, FileKindName] = Field(
+        default_factory=dict, max_length=base.MAX_WORDS, description="The words that stand for `{kind}` in the name"
+    )
+    cycles_cell: Text | None = Field(
+        default=None, description="Label above the table that stands beside the number of cycles, such as `Lastspiele`"
+    )
+
+    @model_validator(mode="after")
+    def _titles_and_channels_are_unique(self) -> Self:
+        for name in ("title", "channel"):
+            values = [value for column in self.columns if (value := getattr(column, name)) is not None]
+            twice = next((value for value, count in Counter(values).items() if count > 1), None)
+            if twice is not None:
+                raise ValueError(f"each {name} must stand once among the columns, {twice!r} stands twice")
+        if not any(column.channel for column in self.columns):
+            raise ValueError("at least one column must hold a channel")
+        return self
+
+
+class RigIn(RigProfile):
+    """A rig profile in a request."""
+
+    name: Identifier = Field(description="The rig's name")
+
+
+class RigOut(RigIn):
+    """A saved rig profile."""
+
+    version: int = Field(description="1 for a new profile; increases with each replacement")
+    saved_at: str = Field(description="When; UTC, ISO 8601")
+    saved_by: str = Field(description="Who: `key:` with the key's id and note, or `local`")
+
+
+RigPage = page_of("RigPage", RigOut, "Rig profiles by name.", "The profiles of this page")
+
+
+class PreviewColumn(Answer):
+    """A column of a file as it is read."""
+
+    title: str = Field(description="Its title, as a profile names it")
+    stated_unit: str | None = Field(description="The unit that the file states; null: none")
+    unit: str | None = Field(description="The unit that is used; null: none, or the column is ignored")
+    channel: ChannelName | None = Field(description="The channel; null: the column is ignored")
+    in_part: bool = Field(description="Whether words of its title are not known, so that the channel should be checked")
+    scale: float = Field(description="The scale, in the channel's unit")
+    offset: float = Field(description="The offset, in the channel's unit")
+
+
+class PreviewPiece(Answer):
+    """A part of a sampled record: a plateau, or the part of a dynamic test at one pressure."""
+
+    start_s: float = Field(description="Its start, s")
+    stop_s: float = Field(description="Its end, s")
+    pressure_bar: float = Field(description="Line pressure, bar")
+    speed_rpm: float | None = Field(description="Speed of a plateau, rpm; null for a stretch")
+
+
+class Preview(Answer):
+    """A file as it would be read and evaluated; nothing is stored."""
+
+    filename: str = Field(description="The sender's name for it")
+    above: list[list[str]] = Field(description="The lines above the table, cell by cell")
+    tables: list[str] = Field(description="The sheets, groups or tests of the file, if there are several")
+    columns: list[PreviewColumn] = Field(description="Every column of the file")
+    first_rows: list[list[str]] = Field(description="The first rows of the file, one text per column")
+    units: dict[str, list[str]] = Field(description="Units that a column of each channel may be in")
+    rig: str | None = Field(description="The applied profile: the requested one, or the one that fits")
+    profile: RigProfile = Field(description="How the file was read, as a profile that you can save")
+    kind: FileKindName | None = Field(
+        description="The kind of run: from the request or the profile, or the only one that fits"
+    )
+    cycles: float | None = Field(
+        description="Cycles: from the request, or through the profile from the file's name or a cell"
+    )
+    run_id: str | None = Field(description="The run's name, if the profile finds one in the file's name")
+    kinds: list[FileKindName] = Field(description="The kinds of run that the channels allow")
+    missing: list[str] = Field(
+        description="What is still missing before the file can be sent: channels, `kind`, `cycles`"
+    )
+    rows: int = Field(description="Samples of each channel")
+    channels: dict[str, list[float]] = Field(description="The channels as they are read, thinned for a plot")
+    pieces: list[PreviewPiece] = Field(description="The parts of a sampled record")
+    fits: list[Fit] = Field(description="The fitted curves, as in a receipt")
+    warnings: list[Warned] = Field(description="Warnings of reading, cutting and fitting, including what was left out")
+    problem: str | None = Field(description="Why the file would be refused; null: it would be accepted")

@@ -1,0 +1,147 @@
+"""A clutch is registered, its record edited, or it is archived: what depends on the record is computed again.
+
+Curves depend on the geometry and on the torque channel's filter alone: where these change, every run is fitted again. The
+record that was registered stays stored.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from sqlalchemy import Connection
+
+from service import repository
+from service.alarms import raising
+from service.api.clutch import ClutchIn
+from service.channels import content_of
+from service.clutch.condition import RANK_UNKNOWN
+from service.clutch.recomputation import Results
+from service.errors import ConflictError
+from storage import changes, clutches
+from storage.clutches import ClutchRow
+from storage.engine.database import Database
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Edited:
+    """A clutch as it was and as it is to be, and what then follows: nothing, results of its history, or all of them."""
+
+    before: ClutchRow
+    record: dict[str, Any]
+    archived: bool
+    results: Results | None
+
+
+def edit(
+    database: Database,
+    clutch_id: str,
+    fields: Mapping[str, Any],
+    *,
+    archived: bool | None,
+    reason: str,
+    by: str,
+    at: str,
+) -> None:
+    """Replace these fields of a clutch's record, each as a whole, and archive the clutch or bring it back (None: neither).
+
+    What is so already is not changed. Raises NotFoundError.
+    """
+    for _ in repository.attempts(clutch_id):
+        edited = _computed(database, clutch_id, fields, archived)
+        if not _entries(edited):
+            return
+        with database.writing(of=clutch_id) as connection:
+            if repository.unchanged(connection, clutch_id, edited.before.revision):
+                _store(connection, edited, reason=reason, by=by, at=at)
+                return
+
+
+def _computed(database: Database, clutch_id: str, fields: Mapping[str, Any], archived: bool | None) -> _Edited:
+    with database.reading() as connection:
+        row = repository.clutch(connection, clutch_id)
+    before = repository.record(row)
+    record = ClutchIn.model_validate(before.model_dump(mode="json") | dict(fields))
+    return _Edited(
+        before=row,
+        record=record.model_dump(mode="json"),
+        archived=row.archived if archived is None else archived,
+        results=None if record == before else _results(database, before, record),
+    )
+
+
+def _results(database: Database, before: ClutchIn, record: ClutchIn) -> Results:
+    """The results that the changed record gives."""
+    with database.reading() as connection:
+        state = repository.state(connection, record.clutch_id, edited=record)
+        levels, receipts = (
+            repository.levels(connection, record.clutch_id),
+            repository.receipts(connection, record.clutch_id),
+        )
+    if (record.geometry, record.torque_filter) != (before.geometry, before.torque_filter):
+        return repository.recomputed(repository.recorded(database, state))
+    return repository.tracked_again(database, state, levels, receipts)
+
+
+def _entries(edited: _Edited) -> list[tuple[str, dict[str, Any], dict[str, Any]]]:
+    """What the audit trail says: the action, and what changes as it was and as it is."""
+    before = repository.record(edited.before).model_dump(mode="json")
+    names = [name for name in before if before[name] != edited.record[name]]
+    entries = []
+    if names:
+        entries.append(
+            (changes.EDIT, {name: before[name] for name in names}, {name: edited.record[name] for name in names})
+        )
+    if edited.archived != edited.before.archived:
+        action = changes.ARCHIVE if edited.archived else changes.UNARCHIVE
+        entries.append((action, {"archived": edited.before.archived}, {"archived": edited.archived}))
+    return entries
+
+
+def _store(connection: Connection, edited: _Edited, *, reason: str, by: str, at: str) -> None:
+    """The record and what follows, and the entries of the audit trail; the revision moves on."""
+    row, clutch_id = edited.before, edited.before.clutch_id
+    clutches.set_record(
+        connection,
+        clutch_id,
+        record=edited.record,
+        content_sha256=content_of(edited.record),
+        registered=row.record if row.registered is None and edited.results is not None else row.registered,
+        archived=edited.archived,
+    )
+    if edited.results is not None:
+        repository.store(connection, clutch_id, edited.results)
+    raising.evaluate(connection, clutch_id)  # an archived one has no alarms
+    revision = clutches.bump_revision(connection, clutch_id)
+    for action, before, after in _entries(edited):
+        changes.insert(connection, clutch_id, action, before, after, at=at, by=by, reason=reason, revision=revision)
+
+
+def register(database: Database, clutch: ClutchIn, *, created_at: str) -> bool:
+    """Register a clutch; returns whether it is new. Raises ConflictError where it is known with other content.
+
+    What is known is the record in force, and, where it was edited, that which was first registered.
+    """
+    record = clutch.model_dump(mode="json")
+    content = content_of(record)
+    with database.reading() as connection:
+        stored = clutches.get(connection, clutch.clutch_id)
+    if stored is None:
+        with database.writing() as connection:
+            stored = clutches.get(connection, clutch.clutch_id)
+            if stored is None:
+                row = ClutchRow(
+                    clutch_id=clutch.clutch_id,
+                    record=record,
+                    content_sha256=content,
+                    created_at=created_at,
+                    revision=0,
+                    rank=RANK_UNKNOWN,
+                    summary={},
+                )
+                clutches.insert(connection, row)
+                return True
+    known = [stored.record] if stored.registered is None else [stored.record, stored.registered]
+    # with the defaults of fields that came after a record was stored
+    if content not in [content_of(ClutchIn.model_validate(old).model_dump(mode="json")) for old in known]:
+        raise ConflictError(f"clutch {stored.clutch_id!r} has another record: change it with PATCH or clutchlife edit")
+    return False

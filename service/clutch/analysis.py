@@ -1,0 +1,200 @@
+"""Analyses one run alone: fits its curves and loops, and notes what is odd.
+
+`analyse` is the first step of every run's way in; `mean_cofs` turns a test's curves into mean COF over a protocol's speeds.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from models.arrays import FloatArray
+from models.clutch import Geometry
+from models.friction.identification import StribeckFit, StribeckFitStatus, fit_curves, mean_torques
+from models.friction.speed_protocol import protocol_speeds
+from models.loops.lag_fit import StationaryCurve
+from models.loops.loops import FrictionLoop, evaluate_loops
+from models.records.criteria import UNLOADED
+from models.records.plateaus import cut_plateaus
+from models.records.runs import Plateaus, curves_by_pressure, loaded
+from models.records.torque_filter import filtered_as_torque
+from service.channels import PASCALS_PER_BAR
+from service.clutch.criteria import FEWEST_SPEEDS, POOR_FIT, WIDE_LEVEL
+from service.clutch.engagements import Engagement, course_item, engagement_notices, evaluated
+from service.clutch.incoming_run import IncomingRun, SampledChannels, sampled_record, stationary_plateaus
+from service.errors import InvalidError, Notice
+
+#: A value and its deviation.
+Value = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LevelFit:
+    """A pressure level's fit, the pressure measured there on average [Pa], and how many distinct speeds it saw."""
+
+    fit: StribeckFit
+    mean_pressure: float
+    speeds: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Analysis:
+    """The results of one run by itself.
+
+    Of a stationary test: `speed_range` [rad/s] under pressure, `oil_temperature` [K], its mean under pressure (None: not
+    measured), `plateaus`, and the `times` [s] of their middles (None where each row was sent as a plateau). Of a block of
+    duty that carries one: `engagement`.
+    """
+
+    fits: tuple[LevelFit, ...] = ()
+    speed_range: tuple[float, float] | None = None
+    oil_temperature: float | None = None
+    warnings: tuple[Notice, ...] = ()
+    plateaus: Plateaus | None = None
+    times: tuple[float, ...] | None = None
+    engagement: Engagement | None = None
+
+    def details_to_store(self, run: IncomingRun) -> dict[str, Any]:
+        """What is kept beside a run's channels: what was sent with them, its range of speeds [rad/s] and its oil [K], the
+        course of an engagement."""
+        details = dict(run.details) | {"origin": run.origin}
+        if run.file is not None:
+            details["file"] = dict(run.file)
+        if self.engagement is not None:
+            return details | course_item(self.engagement)
+        if self.speed_range is not None:
+            details["speed_range"] = list(self.speed_range)
+        if self.oil_temperature is not None:
+            details["oil_temperature"] = self.oil_temperature
+        return details
+
+
+def analyse(run: IncomingRun, geometry: Geometry, torque_filter: float) -> Analysis:
+    """Fit a stationary test's curves, from its plateaus or from its sampled record, and evaluate the engagement of a block
+    of duty; other kinds and tests of the open clutch have neither. `torque_filter` [s]: the time constant of the torque
+    channel's own low-pass, taken off a sampled test; an engagement stays as it was recorded.
+
+    Raises InvalidError where a sampled record holds no steady plateau.
+    """
+    if run.kind != "stationary_stribeck":
+        engagement = evaluated(run, geometry)
+        return Analysis(engagement=engagement, warnings=tuple(engagement_notices(engagement)))
+    if "time_s" not in run.channels:
+        plateaus, notices = stationary_plateaus(run.channels), []
+        if "torque_sd_nm" in run.channels and plateaus.torque_sd is None:
+            message = "torque_sd_nm contains zeros, although every sensor has noise, so the fits do not use it"
+            notices = [Notice(code="torque_sd_ignored", message=message)]
+        return _analyse_stationary(plateaus, None, geometry, notices)
+    try:
+        cut = cut_plateaus(SampledChannels(run.channels), torque_filter)
+    except ValueError as error:
+        message = (
+            f"time_s, pressure_bar, speed_rpm, torque_nm: {error} If each row of the file is a plateau, add time=none."
+        )
+        raise InvalidError.of(message, code="no_plateau", pointer="/channels/torque_nm") from None
+    notices = [Notice(code=code, message=message) for code, message in cut.notes]
+    times = tuple((0.5 * (cut.start + cut.stop)).tolist())
+    return _analyse_stationary(cut.plateaus, times, geometry, notices)
+
+
+def levels_of(plateaus: Plateaus, geometry: Geometry) -> tuple[LevelFit, ...]:
+    """The curves of a stationary test fitted, pressures ascending."""
+    curves = curves_by_pressure(plateaus, geometry)
+    return tuple(
+        LevelFit(fit=fit, mean_pressure=curve.mean_pressure, speeds=int(np.unique(curve.velocity).size))
+        for fit, curve in zip(fit_curves(curves), curves, strict=True)
+    )
+
+
+def loops_of(
+    channels: Mapping[str, FloatArray], geometry: Geometry, torque_filter: float, levels: Sequence[LevelFit]
+) -> tuple[FrictionLoop, ...]:
+    """The friction loops of a dynamic test, with the lag behind the curves of its stationary test and beyond the torque
+    channel's own, of `torque_filter` [s]. What a curve's covariance leaves open makes the lag less certain, or unresolved.
+    """
+    curves = {level.fit.pressure: StationaryCurve.of(level.fit) for level in levels if level.speeds >= FEWEST_SPEEDS}
+    return evaluate_loops(filtered_as_torque(sampled_record(channels), torque_filter), geometry, curves or None)
+
+
+def _analyse_stationary(
+    plateaus: Plateaus, times: tuple[float, ...] | None, geometry: Geometry, noticed: Sequence[Notice]
+) -> Analysis:
+    under_load = loaded(plateaus)
+    noticed = [*_unloaded(plateaus, under_load), *noticed]
+    if under_load is None:
+        return Analysis(warnings=tuple(noticed), plateaus=plateaus, times=times)
+    levels = levels_of(under_load, geometry)
+    speed = np.abs(under_load.speed)
+    low, high = float(speed.min()), float(speed.max())
+    has_mean = low < high and mean_cofs(levels, geometry.sliding_velocity(protocol_speeds(low, high)), geometry)
+    warnings = [
+        *noticed,
+        *(notice for level in levels for notice in _level_warnings(level, under_load)),
+        *(notice for level in levels for notice in _fit_warnings(level.fit)),
+    ]
+    if not has_mean:
+        message = (
+            f"without a mean COF this test does not count for the remaining life: test {FEWEST_SPEEDS} speeds or more"
+        )
+        warnings.append(Notice(code="no_mean_cof", message=message))
+    return Analysis(
+        fits=levels,
+        speed_range=(low, high) if has_mean else None,
+        oil_temperature=None if under_load.oil_temperature is None else float(under_load.oil_temperature.mean()),
+        warnings=tuple(warnings),
+        plateaus=plateaus,
+        times=times,
+    )
+
+
+def mean_cofs(levels: Sequence[LevelFit], velocities: FloatArray, geometry: Geometry) -> dict[float, Value]:
+    """Mean COF over the protocol's velocities [m] m/s and its deviation by pressure [Pa], where a level determines it."""
+    usable = [level for level in levels if level.speeds >= FEWEST_SPEEDS]
+    if not usable:
+        return {}
+    per_cof = np.array([geometry.torque_per_cof(level.mean_pressure) for level in usable])
+    values = (mean_torques([level.fit for level in usable], velocities) / per_cof[:, None]).tolist()
+    return {
+        level.fit.pressure: (cof, sd)
+        for level, (cof, sd) in zip(usable, values, strict=True)
+        if math.isfinite(cof) and 0 < sd < cof
+    }
+
+
+def _level_warnings(level: LevelFit, plateaus: Plateaus) -> list[Notice]:
+    """A level over whose rows the pressure varies widely may be several that ran together."""
+    near = np.abs(plateaus.pressure - level.fit.pressure) <= WIDE_LEVEL * level.fit.pressure
+    rows = int(np.count_nonzero(near))
+    if rows >= level.fit.points:
+        return []
+    message = (
+        f"at {level.fit.pressure / PASCALS_PER_BAR:g} bar the pressures scatter by more than {100 * WIDE_LEVEL:g} %. "
+        "Were several pressures tested here? Keep them further apart"
+    )
+    return [Notice(code="wide_level", message=message)]
+
+
+def _unloaded(plateaus: Plateaus, under_load: Plateaus | None) -> list[Notice]:
+    below = f"below {UNLOADED / PASCALS_PER_BAR:g} bar"
+    if under_load is None:
+        message = (
+            f"the clutch was open (all pressures {below}): no curve is fitted, and only a diagnosis uses this test"
+        )
+        return [Notice(code="open_clutch", message=message)]
+    left_out = plateaus.torque.size - under_load.torque.size
+    noun = "plateau" if left_out == 1 else "plateaus"
+    message = f"left out of the fits: {left_out} {noun} {below}"
+    return [Notice(code="unloaded_plateaus", message=message)] if left_out else []
+
+
+def _fit_warnings(fit: StribeckFit) -> list[Notice]:
+    at = f"at {fit.pressure / PASCALS_PER_BAR:g} bar"
+    if fit.status is StribeckFitStatus.UNDETERMINED:
+        return [Notice(code="undetermined", message=f"{at}: {fit.message}")]
+    poor = fit.rmse > POOR_FIT * float(fit.parameters.static_torque)
+    if not fit.acceptable and fit.mse_percent is not None and poor:
+        message = f"{at}: the fit is poor: MSE {fit.mse_percent:.3g} % (limit: 5 %), RMSE {fit.rmse:.3g} Nm"
+        return [Notice(code="poor_fit", message=message)]
+    return []

@@ -1,0 +1,384 @@
+"""The condition of a clutch, as lists, pages and terminals show it: remaining life in short, state, reason and advice.
+
+`summarised` (in `with_held.py`) makes what is stored; `state_of` is the only place where a state is decided, `top_line` the
+only one where the line above a clutch's page and its action are written.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime
+from typing import Any
+
+from models.prognosis.criteria import FEWEST_TESTS, HORIZON
+from models.prognosis.first_passage import PassageStatus
+from service.channels import whole
+from service.clutch.criteria import LONGEST_TEST, MAX_LINE_POINTS, NEAR_LIMIT, SOON
+from service.clutch.items import ENDED, INSUFFICIENT
+from service.clutch.notices import interval_in_words
+from service.clutch.timeline import WORN, Event, Series, date_of
+
+_SECONDS_PER_DAY = 86_400.0
+#: The states of a clutch after NAMUR NE 107; the first that holds is its state.
+STATES = FAILURE, MAINTENANCE, CHECK, OUT_OF_SPECIFICATION, NORMAL = (
+    "failure",
+    "maintenance",
+    "check",
+    "out_of_specification",
+    "normal",
+)
+#: What a state is called on a page and in a terminal.
+STATE_WORDS = dict(
+    zip(STATES, ("Failure", "Maintenance required", "Function check", "Out of specification", "Normal"), strict=True)
+)
+#: Verdicts by which data and model disagree.
+DISAGREES = NAMED, AMBIGUOUS, _ = ("cause_named", "cause_ambiguous", "unexplained_structure")
+#: What of a prediction is stored with a clutch and shown by lists, and all that is stored.
+SUMMARY = (
+    "status", "as_of_cycles", "runs_used", "current", "criterion", "remaining_cycles", "at_least",
+    "probability_of_reaching", "model", "ended",
+)  # fmt: skip
+STORED = (*SUMMARY, "horizon_cycles", "end_of_life_cycles")
+#: What is said beside a prediction.
+BESIDE = ("at_least", "at_least_at", "counted_from", "held_runs", "statement")
+REACHED = PassageStatus.REACHED.value
+#: The filter whose predictions lists and receipts show.
+SHOWN = "particle"
+#: The warning of an answer beside which runs are held.
+HELD_RUNS = "held_runs"
+#: A clutch without a prediction comes after all others in a list.
+RANK_UNKNOWN = 2 * HORIZON
+
+
+def rank_of(summary: Mapping[str, Any]) -> float:
+    """Where a clutch comes in a list: the fewer cycles it is safe for, held runs considered, the earlier."""
+    if summary.get("status", INSUFFICIENT) == INSUFFICIENT:
+        return RANK_UNKNOWN
+    bound = bound_of(summary)
+    return HORIZON if bound is None else min(bound, HORIZON)
+
+
+def with_held_runs(
+    payload: Mapping[str, Any], summary: Mapping[str, Any], among: Mapping[str, Any] | None, count: int
+) -> dict[str, Any]:
+    """What an answer says beside its prediction: `held_runs` with what these, `count`, would make of it, which is `among`
+    (None: none is held), and the safe bound as the lower of both, with its date at the pace of the runs; `summary` is that
+    of the clutch, empty where the answer is of an earlier time or life."""
+    held_runs, warnings = None, list(payload["warnings"])
+    if among is not None:
+        held_runs = {"count": count} | {name: among[name] for name in ("status", "remaining_cycles")}
+        warnings.append(_warning_about_held_runs(payload, among, count))
+    at_least = lower_bound(payload["at_least"], among)
+    at, since = None, None
+    if at_least is not None and (pace := summary.get("pace")) is not None:
+        at, since = date_of(pace["moment"] + at_least / pace["cycles_per_second"]), date_of(pace["moment"])
+    return {
+        "at_least": at_least,
+        "at_least_at": at,
+        "counted_from": since,
+        "held_runs": held_runs,
+        "statement": statement_of(payload, at_least),
+        "warnings": warnings,
+    }
+
+
+def pace_in_words(pace: Mapping[str, float] | None, cycles: float | None) -> str | None:
+    """Cycles as days at the pace of the runs, and the day that they count from: no answer depends on today's date, which may
+    be long after the last run. None where either is unknown."""
+    since = None if pace is None or cycles is None else date_of(pace["moment"])
+    if pace is None or cycles is None or since is None:
+        return None
+    days = cycles / pace["cycles_per_second"] / _SECONDS_PER_DAY
+    shown = "less than a day" if days < 1.0 else "1 day" if days < 2.0 else f"{rounded_down(days)} days"
+    day = datetime.fromisoformat(since)
+    return f"{shown} at the pace so far, counted from the last run on {day.day} {day:%b %Y}"
+
+
+def stated(summary: Mapping[str, Any]) -> dict[str, Any] | None:
+    """A clutch's summary as lists show it; None before the first run that counts."""
+    if "status" not in summary:
+        return None
+    beside = with_held_runs({**summary, "warnings": ()}, summary, _with_held(summary), summary.get("held", 0))
+    return {name: summary[name] for name in SUMMARY} | {name: beside[name] for name in BESIDE}
+
+
+def lower_bound(at_least: float | None, among: Mapping[str, Any] | None) -> float | None:
+    """The lower of a safe bound and that with the held runs, None where neither is known."""
+    bounds = [at_least, None if among is None else among["at_least"]]
+    return min((bound for bound in bounds if bound is not None), default=None)
+
+
+def _with_held(summary: Mapping[str, Any]) -> Mapping[str, Any] | None:
+    """The shown prediction with the held runs; None where none is held."""
+    return (summary.get("with_held") or {}).get(SHOWN)
+
+
+def bound_of(summary: Mapping[str, Any]) -> float | None:
+    """The safe bound of a summary, held runs considered; None where it is not known."""
+    return lower_bound(summary["at_least"], _with_held(summary))
+
+
+def _warning_about_held_runs(payload: Mapping[str, Any], among: Mapping[str, Any], count: int) -> dict[str, str]:
+    """What held runs would make of an answer, by all that it states: where both are unknown the safe bounds may differ."""
+    if all(among[name] == payload[name] for name in ("status", "remaining_cycles", "at_least")):
+        effect = f"the remaining life would be the same with {_them(count)}"
+    elif among["status"] == REACHED:
+        effect = f"with {_them(count)} the end of life would be reached"
+    elif among["status"] == INSUFFICIENT and among["at_least"] is None:
+        effect = f"with {_them(count)} nothing could be predicted"
+    elif among["status"] == INSUFFICIENT:
+        effect = f"with {_them(count)} the remaining life is not known: {bound_in_words(among['at_least'])}"
+    else:
+        effect = f"with {_them(count)} {interval_in_words(among['remaining_cycles'])} cycles would remain"
+    return {"code": HELD_RUNS, "message": f"{held_in_words(count)}: {effect}"}
+
+
+def held_runs_left_out(count: int) -> dict[str, Any]:
+    """What an answer that is without so many held runs says of them: `held_runs`, and a warning where there are some."""
+    message = f"{held_in_words(count)}: this is without {_them(count)}"
+    return {"held_runs": count, "warnings": [{"code": HELD_RUNS, "message": message}] if count else []}
+
+
+def _them(count: int) -> str:
+    return "it" if count == 1 else "them"
+
+
+def held_in_words(count: int) -> str:
+    return "1 run is held and does not count" if count == 1 else f"{count} runs are held and do not count"
+
+
+def state_of(summary: Mapping[str, Any], *, disputed: bool, silent: str | None = None) -> dict[str, str]:
+    """A clutch's state after NAMUR NE 107 by its summary, and why; `disputed`: its newest diagnosis found that data and
+    model disagree, and nobody has acted on it; `silent`: since when its rig has sent nothing, where that is an alarm."""
+    name, reason = _state_and_reason(summary, disputed=disputed, silent=silent)
+    if reason or "status" not in summary:
+        return {"name": name, "why": reason}
+    return {"name": name, "why": statement_of(summary, bound_of(summary))}
+
+
+def _state_and_reason(summary: Mapping[str, Any], *, disputed: bool, silent: str | None) -> tuple[str, str]:
+    """The first state that holds, and why as a clause; no reason where the statement of the remaining life is one."""
+    held = summary.get("held", 0)
+    if "damaged" in summary:
+        return CHECK, f"its stored results are damaged: {summary['damaged']}"
+    if "status" not in summary:
+        return CHECK, held_in_words(held) if held else "no run counts yet"
+    status = summary["status"]
+    worn = status == ENDED and summary["ended"]["reason"] == WORN
+    near = None if status in (REACHED, INSUFFICIENT, ENDED) else _near_end(summary)
+    rules = (
+        (FAILURE, "" if status == REACHED or worn else None),
+        (MAINTENANCE, near),
+        (CHECK, held_in_words(held) if held else None),
+        (CHECK, _tests(summary) if status == INSUFFICIENT else None),
+        (CHECK, (silent and status != ENDED and silence_in_words(silent)) or None),
+        (OUT_OF_SPECIFICATION, "data and model disagree, see the diagnosis" if disputed and status != ENDED else None),
+        (NORMAL, ""),
+    )
+    return next((name, reason) for name, reason in rules if reason is not None)
+
+
+def silence_in_words(since: str) -> str:
+    """The clause that says that no run has arrived since a moment (ISO 8601)."""
+    return f"the rig is silent, no run arrived since {since[:16].replace('T', ' ')} UTC"
+
+
+def top_line(
+    summary: Mapping[str, Any], *, disputed: bool, diagnosis: Mapping[str, Any] | None = None, silent: str | None = None
+) -> dict[str, str]:
+    """What stands first on a clutch's page and in `clutchlife status`: `headline`, its state in words, the safe bound in
+    cycles and days, and the median; `action`, what to do. `diagnosis`: the newest one as it goes out."""
+    name, reason = _state_and_reason(summary, disputed=disputed, silent=silent)
+    words = STATE_WORDS[name]
+    if "status" not in summary:
+        return {"headline": f"{words}: {reason}", "action": _action(name, summary, "soon", diagnosis)}
+    at_least = bound_of(summary)
+    paced = pace_in_words(summary.get("pace"), at_least)
+    soon = "now" if at_least is not None and at_least < 1.0 else "soon" if paced is None else f"within {paced}"
+    says = _numbers_in_words(summary, at_least, paced)
+    return {
+        "headline": f"{words}: {reason}; {says}" if reason else f"{words}: {says}",
+        "action": _action(name, summary, soon, diagnosis),
+    }
+
+
+def _numbers_in_words(summary: Mapping[str, Any], at_least: float | None, paced: str | None) -> str:
+    """The safe bound (both, where held runs lower it), its days and the median; the statement where there is no number."""
+    own = summary["at_least"]
+    if own is not None and own >= 1.0 and at_least is not None and at_least < own:
+        runs = "the held run counts" if summary.get("held") == 1 else "the held runs count"
+        if at_least < 1.0:
+            return f"no further cycle is safe if {runs}; {bound_in_words(own)} if not"
+        return f"{bound_in_words(at_least)} if {runs}, for {rounded_down(own)} if not"
+    if summary["status"] in (REACHED, INSUFFICIENT, ENDED) or at_least is None or at_least < 1.0:
+        return statement_of(summary, at_least)
+    bound = bound_in_words(at_least) + ("" if paced is None else f": {paced}")
+    if summary["status"] == PassageStatus.MAY_NEVER_REACH.value:
+        return _left_open(bound, summary)
+    median = summary["remaining_cycles"]["0.5"]
+    unit = _second_digit(max(1.0, median))
+    return f"{bound}; 50 % chance of {round(median / unit) * unit:,.0f} or more"
+
+
+def _action(name: str, summary: Mapping[str, Any], soon: str, diagnosis: Mapping[str, Any] | None) -> str:
+    """What to do about a state, in one sentence; `soon`: how soon."""
+    held = summary.get("held", 0)
+    if name == FAILURE:
+        unseen = summary["status"] == REACHED and untested_since(summary) is not None
+        return "Run a stationary test, or replace the clutch." if unseen else "Replace the clutch."
+    if name == MAINTENANCE:
+        return f"Replace {soon}."
+    if "damaged" in summary:
+        return "Run clutchlife verify, then clutchlife replay, on the service's machine."
+    if name == CHECK and held:
+        return "Confirm, correct or withdraw " + ("one held run." if held == 1 else f"{held} held runs.")
+    if name == CHECK and summary.get("status", INSUFFICIENT) != INSUFFICIENT:
+        return "Find out why the rig sends nothing."
+    if name == CHECK:
+        missing = FEWEST_TESTS - _distinct_test_cycles(summary)
+        tests = "one more stationary test" if missing == 1 else f"{missing} more stationary tests, at different cycles"
+        alike = ", with the pressures and oil of this life's first test" if _tests_unlike_first(summary) else ""
+        return f"Run {tests}{alike}: then the remaining life is predicted."
+    if name == NORMAL or diagnosis is None:
+        return "Its life has ended: nothing to do." if summary.get("ended") else "Nothing to do: carry on testing."
+    causes = [_cause_in_words(cause) for cause in diagnosis["causes"]]
+    if diagnosis["adoptable"] and diagnosis["verdict"] == NAMED:
+        return f"Adopt the model with {' and '.join(causes)}: it explains where data and model disagree."
+    if (advice := diagnosis["advice"]) is not None:
+        unclear = "The cause is not clear yet. " if diagnosis["verdict"] == AMBIGUOUS else ""
+        return f"{unclear}Run {_test_in_words(advice['test'])}: {_decides(advice['separates'])}."
+    return "Read the diagnosis before you rely on the forecast."
+
+
+def _test_in_words(test: str) -> str:
+    """An advised test; of a long protocol, which the diagnosis shows whole, its first test."""
+    test = test.removeprefix("the ")
+    if not test.startswith(("stationary", "dynamic")):
+        return test
+    return f"a {test}" if len(test) <= LONGEST_TEST else f"the advised tests, first a {test.partition(',')[0]}"
+
+
+def _decides(separates: Sequence[str]) -> str:
+    effects = [_cause_in_words(effect) for effect in separates if effect != "baseline"]
+    if len(effects) == 1:
+        return f"it shows whether {effects[0]} is at work"
+    return f"it decides between {' and '.join(effects)}"
+
+
+def _cause_in_words(slug: str) -> str:
+    return "a cause outside the catalogue" if slug == "uncatalogued" else slug.replace("_", " ")
+
+
+def _tests(summary: Mapping[str, Any]) -> str:
+    """How many of the tests that a prediction needs there are, as a clause."""
+    places, left_out = _distinct_test_cycles(summary), _tests_unlike_first(summary)
+    known = f"{places} of the {FEWEST_TESTS} tests that a prediction needs"
+    if places < summary["runs_used"]:
+        known = f"tests at {places} of the {FEWEST_TESTS} different cycles that a prediction needs"
+    return f"{known} ({left_out} more cannot be compared with the first)" if left_out else known
+
+
+def _distinct_test_cycles(summary: Mapping[str, Any]) -> int:
+    """At how many different cycles there are tests that count; of a summary that does not state it, how many tests count."""
+    return int(summary.get("places", summary.get("runs_used", 0)))
+
+
+def _tests_unlike_first(summary: Mapping[str, Any]) -> int:
+    """How many tests cannot be compared with the first."""
+    return int(summary.get("tests", 0) - summary.get("runs_used", 0)) if "tests" in summary else 0
+
+
+def _near_end(summary: Mapping[str, Any]) -> str | None:
+    """Why a predicted end is near, by the share of life left at the safe bound or by a quantity's limit; None: it is not."""
+    age = summary["as_of_cycles"] - summary["from_cycles"]
+    if summary["at_least"] < SOON * (age + summary["at_least"]):
+        return f"less than {100 * SOON:.0f} % of its life may be left"
+    health = summary["current"]["health"]
+    if health is not None and health < NEAR_LIMIT:
+        return f"near its limit, {limit_in_words(summary['criterion'])}"
+    return None
+
+
+def statement_of(payload: Mapping[str, Any], at_least: float | None) -> str:
+    """What is known of the remaining life as a sentence: its safe bound, which held runs may lower, and how probable an end
+    is that is left open."""
+    bound, own = bound_in_words(at_least), payload["at_least"]
+    if own is not None and bound != bound_in_words(own):
+        bound += ", if held runs count"
+    if (end := payload.get("ended")) is not None:
+        early = "" if end["reason"] == WORN else ", taken out before it was worn"
+        return f"ended at {end['cycles']:,.0f} cycles{early}"
+    if payload["status"] == REACHED:
+        tested = untested_since(payload)
+        since = "reached" if tested is None else f"probably reached since the last test at {tested:,.0f} cycles"
+        return f"the end of life is {since}: its limit is {limit_in_words(payload['criterion'])}"
+    if payload["status"] == INSUFFICIENT:
+        return "the remaining life is not known yet" + (f": {bound}" if payload["runs_used"] else "")
+    return _left_open(bound, payload) if payload["status"] == PassageStatus.MAY_NEVER_REACH.value else bound
+
+
+def untested_since(payload: Mapping[str, Any]) -> float | None:
+    """The cycles of the last test where a reached end is predicted to lie after it: no measurement has seen it."""
+    tested, end = payload["current"]["measured_at_cycles"], payload.get("end_of_life_cycles", {}).get("0.5")
+    return tested if tested is not None and end is not None and end > tested else None
+
+
+def _left_open(bound: str, payload: Mapping[str, Any]) -> str:
+    """An interval that reaches the horizon: its safe bound is the number that counts, and how probable an end is."""
+    chance = chance_in_words(payload["probability_of_reaching"])
+    within = f"the end comes within {payload.get('horizon_cycles', HORIZON):,.0f} cycles with a probability of {chance}"
+    return f"{bound}; the tests do not yet show how many more ({within})"
+
+
+def bound_in_words(at_least: float | None) -> str:
+    """The safe bound of the remaining cycles, rounded down to two digits."""
+    if at_least is None or at_least < 1.0:
+        return "no further cycle is safe"
+    return f"safe for {rounded_down(at_least)} more {'cycle' if at_least < 2.0 else 'cycles'} (95 %)"
+
+
+def rounded_down(cycles: float) -> str:
+    """Cycles, at least 1, rounded down to two digits."""
+    unit = _second_digit(cycles)
+    return f"{math.floor(cycles / unit) * unit:,.0f}"
+
+
+def _second_digit(cycles: float) -> float:
+    """The unit of the second digit of a number of cycles, at least 1."""
+    return float(10.0 ** max(0, math.floor(math.log10(cycles)) - 1))
+
+
+def limit_in_words(criterion: Mapping[str, Any]) -> str:
+    """A criterion as part of a sentence, as `mean COF at 50 % of new`."""
+    units = (("speed_rpm", "rpm"), ("frequency_hz", "Hz"), ("pressure_bar", "bar"))
+    place = [f"{criterion[name]:g} {unit}" for name, unit in units if criterion.get(name) is not None]
+    name = ", ".join([criterion["quantity"].replace("_", " ").replace("cof", "COF"), *place])
+    if criterion["fraction"] is not None:
+        return f"{name} at {100 * criterion['fraction']:g} % of new"
+    word = "below" if criterion.get("below") is not None else "above"
+    return f"{name} {word} {criterion[word]:g}"
+
+
+def chance_in_words(probability: float) -> str:
+    """A probability in per cent, never rounded to certainty."""
+    if probability > 0.995:
+        return "more than 99 %"
+    return "less than 1 %" if probability < 0.005 else f"{math.floor(100 * probability + 0.5)} %"
+
+
+def recent(events: Sequence[Event], series: Series) -> dict[str, Any]:
+    """The run that was made last, and mean COF [-] of the present life as a short line, thinned evenly, its last value kept.
+
+    `events` is not empty; `series` is mean COF over the reference pressures, ordered by cycles.
+    """
+    last = max(events, key=lambda event: event.moment)
+    values = [measurement.value for measurement in series.measurements]
+    step = -(-len(values) // MAX_LINE_POINTS)  # rounded up
+    return {
+        "last_run": {
+            "run_id": last.run_id,
+            "kind": last.kind,
+            "cycles": whole(last.cycles),
+            "at": datetime.fromtimestamp(last.moment, UTC).isoformat(timespec="seconds"),
+        },
+        "mean_cof": [round(value, 6) for value in values[::-1][:: step or 1]][::-1],
+    }

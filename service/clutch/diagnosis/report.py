@@ -1,0 +1,215 @@
+"""A diagnosis report in the names and units of the API; every number is finite or null."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from enum import Enum
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from models.arrays import FloatArray
+from service.api import diagnosis as shapes
+from service.api.base import Answer
+from service.channels import PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM, ZERO_CELSIUS, bar
+
+if TYPE_CHECKING:  # start-up time: they load the whole diagnosis
+    from models.diagnosis.experiments.candidates import Step
+    from models.diagnosis.report.maps import LoopTrace, Maps
+    from models.diagnosis.report.report import Misfit, Report
+    from models.diagnosis.validation.held_out import Gain
+
+#: Maps and traces are looked at: more digits than these only weigh.
+_DIGITS = 6
+
+
+#: The numbers of a gain that have other names where they are found.
+_GAIN = {"reduction_percent_sd": "reduction_sd", "prediction_log_score_gain": "forecast_log_score_gain"}
+
+
+def empty() -> dict[str, Any]:
+    """The report of a diagnosis that has none: nothing said, in the same shape."""
+    return {
+        "verdict": None,
+        "causes": [],
+        "summary": "",
+        "explanations": [],
+        "candidates": [],
+        "baseline": _misfit(None),
+        "extended": _misfit(None),
+        "gain": _gain(None, {}, {}),
+        "advice": [],
+        "visible": [],
+        "not_adoptable": None,
+        "notes": [],
+        "statistics": {},
+        "maps": None,
+        "loops": [],
+        "isolability": None,
+    }
+
+
+def public(
+    report: Report, *, origin: float, before: Mapping[str, Any], after: Mapping[str, Any], notes: tuple[str, ...]
+) -> dict[str, Any]:
+    """The report as it is answered; its cycles counted from `origin` become cycles since new.
+
+    `before` and `after` are the remaining useful life under the baseline and under the extension.
+    """
+    return empty() | {
+        "verdict": report.verdict.value,
+        "causes": list(report.causes),
+        "summary": " ".join(part for part in (report.summary, _remaining(report, before, after)) if part),
+        "explanations": [_shaped(shapes.ExplanationOut, explanation) for explanation in report.explanations],
+        "candidates": [
+            _shaped(shapes.CandidateOut, candidate, estimate=_shaped(shapes.Amplitude, candidate.estimate))
+            for candidate in report.candidates
+        ],
+        "baseline": _misfit(report.baseline),
+        "extended": _misfit(report.extended),
+        "gain": _gain(report.gain, before, after),
+        "advice": [
+            _shaped(
+                shapes.AdviceOut,
+                test,
+                separates=[test.effect, test.other],
+                narrows=finite(test.narrows) if test.narrows else None,
+                minutes=round(test.minutes, 1),
+                steps=[_step(step, origin) for step in test.steps],
+            )
+            for test in report.advice
+        ],
+        "visible": [_shaped(shapes.VisibleOut, smallest) for smallest in report.visible],
+        "not_adoptable": report.not_adoptable or None,
+        "notes": [*notes, *report.notes],
+        "statistics": {name: finite(value) for name, value in report.statistics.items()},
+        "maps": None if report.maps is None else _maps(report.maps, origin),
+        "loops": [_loop(loop, origin) for loop in report.loops],
+        "isolability": None
+        if report.isolability is None
+        else {
+            "pairs": [
+                _shaped(
+                    shapes.PairOut,
+                    pair,
+                    key=pair.trial or None,
+                    test=pair.test or None,
+                    with_test=finite(pair.with_trial),
+                )
+                for pair in report.isolability.pairs
+            ],
+            "unseen": list(report.isolability.unseen),
+        },
+    }
+
+
+def _shaped(schema: type[Answer], found: object, **others: Any) -> dict[str, Any]:
+    """The fields of a schema, of what was found; the others in their places."""
+    return {name: others[name] if name in others else _plain(getattr(found, name)) for name in schema.model_fields}
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Enum):
+        return value.value
+    if isinstance(value, tuple):
+        return [_plain(item) for item in value]
+    return finite(value) if isinstance(value, float) else value
+
+
+def _remaining(report: Report, before: Mapping[str, Any], after: Mapping[str, Any]) -> str:
+    """What adopting the extension would do to the median of the remaining life, in a sentence; nothing without one.
+
+    Two digits: a filter's draws move the third, and with them the clutch's name."""
+    medians = [(forecast.get("remaining_cycles") or {}).get("0.5") for forecast in (before, after)]
+    if report.extension is None or None in medians:
+        return ""
+    now, then = (f"{float(f'{median:.2g}'):,.0f}" for median in medians)
+    if now == then == "0":
+        return ""
+    if now == "0":
+        return f"If you adopt it, the end is not reached any more: a median of about {then} cycles remains."
+    if then == "0":
+        return f"If you adopt it, the end is reached; without it, a median of about {now} cycles remains."
+    if now == then:
+        return f"If you adopt it, the median of the remaining life stays at about {now} cycles."
+    return f"If you adopt it, the median of the remaining life changes from about {now} to about {then} cycles."
+
+
+def _step(step: Step, origin: float) -> dict[str, Any]:
+    return _shaped(
+        shapes.PlanStep,
+        step,
+        pressures_bar=[round(bar(pressure), 4) for pressure in step.pressures],
+        speeds_rpm=[round(speed / RADIANS_PER_SECOND_PER_RPM, 2) for speed in step.speeds],
+        frequency_hz=step.frequency,
+        oil_temperature_c=None if step.temperature is None else round(step.temperature - ZERO_CELSIUS, 2),
+        cycles=step.cycles + origin,
+        pause_hours=step.pause / 3600.0,
+        minutes=round(step.minutes, 1),
+    )
+
+
+def finite(value: float) -> float | None:
+    """The number where it is one that JSON can carry, else None."""
+    number = float(value)
+    return number if math.isfinite(number) else None
+
+
+def _misfit(misfit: Misfit | None) -> dict[str, Any]:
+    if misfit is None:
+        return {"rmse_nm": None, "noise_nm": None, "unexplained_share": None, "where": []}
+    return _shaped(
+        shapes.MisfitOut,
+        misfit,
+        rmse_nm=finite(misfit.rmse),
+        noise_nm=finite(misfit.noise),
+        where=[_shaped(shapes.WhereOut, axis) for axis in misfit.where],
+    )
+
+
+def _gain(gain: Gain | None, before: Mapping[str, Any], after: Mapping[str, Any]) -> dict[str, Any]:
+    numbers = [name for name in shapes.GainOut.model_fields if name not in {"held_out_runs", "remaining_useful_life"}]
+    attributes = {name: _GAIN.get(name, name.removesuffix("_nm")) for name in numbers}
+    return {
+        "held_out_runs": [] if gain is None else list(gain.held_out_runs),
+        **{name: None if gain is None else finite(getattr(gain, attribute)) for name, attribute in attributes.items()},
+        "remaining_useful_life": {"before": dict(before), "after": dict(after)},
+    }
+
+
+def _maps(maps: Maps, origin: float) -> dict[str, Any]:
+    return {
+        "axes": {
+            "pressure_bar": [bar(pressure) for pressure in maps.pressure.tolist()],
+            "speed_rpm": _numbers(maps.speed / RADIANS_PER_SECOND_PER_RPM),
+            "cycles": _numbers(maps.cycles + origin),
+        },
+        "before": {
+            "speed_pressure": _numbers(maps.speed_pressure_before),
+            "pressure_cycles": _numbers(maps.pressure_cycles_before),
+        },
+        "after": {
+            "speed_pressure": _numbers(maps.speed_pressure_after),
+            "pressure_cycles": _numbers(maps.pressure_cycles_after),
+        },
+    }
+
+
+def _loop(loop: LoopTrace, origin: float) -> dict[str, Any]:
+    return {
+        "pressure_bar": loop.pressure / PASCALS_PER_BAR,
+        "cycles": loop.cycles + origin,
+        "frequency_hz": finite(loop.frequency),
+        "speed_rpm": _numbers(loop.speed / RADIANS_PER_SECOND_PER_RPM),
+        "measured_nm": _numbers(loop.measured),
+        "baseline_nm": _numbers(loop.baseline),
+        "extended_nm": _numbers(loop.extended),
+    }
+
+
+def _numbers(values: FloatArray) -> list[Any]:
+    """An array of any shape as nested lists, rounded, with None where a number is not finite."""
+    if values.ndim > 1:
+        return [_numbers(row) for row in values]
+    return [float(f"{value:.{_DIGITS}g}") if math.isfinite(value) else None for value in np.asarray(values).tolist()]

@@ -1,0 +1,197 @@
+"""Measured engagements: that of one run, evaluated in the public names and units, and those of a clutch over its lives.
+
+The reference of a life is made of its first engagements after the run-in; those of another initial speed or pressure than
+the very first are of another duty, and are neither part of it nor compared with it.
+"""
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from models.arrays import FloatArray
+from models.clutch import Geometry
+from models.engagements.comparison import Comparison, SpeedCourse, compared, reference_of, same_duty
+from models.engagements.measured import EngagementIndicators, measured_engagement
+from models.engagements.slip import Refusal, ValueWithError
+from service.channels import CHANNELS, PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM
+from service.clutch.incoming_run import IncomingRun, sampled_record
+from service.errors import Notice
+
+#: The indicators of a run's engagement, or why it has none.
+Engagement: TypeAlias = EngagementIndicators | Refusal
+
+#: Kinds of runs that may carry the record of an engagement.
+DUTY_KINDS = ("duty_cycles", "run_in")
+#: Where a run's own comparison course stands among what is kept beside its channels.
+COURSE = "engagement_course"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Indicator:
+    """An indicator at the edge: public value = SI value / factor; its `field` in the models."""
+
+    field: str
+    unit: str = "1"
+    factor: float = 1.0
+
+
+#: The indicators of one engagement by public name.
+INDICATORS: Mapping[str, Indicator] = {
+    "stop_time_s": Indicator(field="stop_time", unit="s"),
+    "engagement_energy_kj": Indicator(field="energy", unit="kJ", factor=1000.0),
+    "peak_power_kw": Indicator(field="peak_power", unit="kW", factor=1000.0),
+    "initial_cof": Indicator(field="initial_cof"),
+    "midpoint_cof": Indicator(field="midpoint_cof"),
+    "endpoint_cof": Indicator(field="endpoint_cof"),
+    "breakaway_cof": Indicator(field="breakaway_cof"),
+    "initial_cof_ratio": Indicator(field="initial_ratio"),
+    "endpoint_cof_ratio": Indicator(field="endpoint_ratio"),
+    "breakaway_cof_ratio": Indicator(field="breakaway_ratio"),
+    "torque_rise": Indicator(field="torque_rise"),
+}
+#: The indicators of an engagement against the first ones of its life.
+COMPARED: Mapping[str, Indicator] = {
+    "normalised_duration": Indicator(field="normalised_duration"),
+    "euclidean_distance": Indicator(field="euclidean_distance"),
+    "spectral_angle_rad": Indicator(field="spectral_angle", unit="rad"),
+}
+#: All indicators by public name, in the order in which answers have them.
+ALL_INDICATORS: Mapping[str, Indicator] = {**INDICATORS, **COMPARED}
+
+
+def evaluated(run: IncomingRun, geometry: Geometry) -> Engagement | None:
+    """The engagement that a block of duty carries; None for a run without one."""
+    if run.kind not in DUTY_KINDS or not run.channels:
+        return None
+    return measured_engagement(sampled_record(run.channels), geometry)
+
+
+def engagement_notices(engagement: Engagement | None) -> list[Notice]:
+    """The warning of a record that was sent and holds no engagement."""
+    if not isinstance(engagement, Refusal):
+        return []
+    message = f"the engagement is stored but not evaluated: {engagement.message}"
+    return [Notice(code="no_engagement", message=message)]
+
+
+def engagement_item(engagement: Engagement) -> dict[str, Any]:
+    """An engagement as a receipt shows it; null is what the record does not determine."""
+    if isinstance(engagement, Refusal):
+        nothing = ("start_s", "end_s", "initial_speed_rpm", "maximum_pressure_bar")
+        return {
+            "status": engagement.status.value,
+            "message": engagement.message,
+            **dict.fromkeys(nothing),
+            "indicators": dict.fromkeys(INDICATORS),
+        }
+    slip = engagement.slip
+    return {
+        "status": "determined",
+        "message": f"The clutch slipped for {engagement.stop_time.value:.3g} s.",
+        "start_s": slip.start.value,
+        "end_s": slip.end.value,
+        "initial_speed_rpm": engagement.initial_speed.value / RADIANS_PER_SECOND_PER_RPM,
+        "maximum_pressure_bar": engagement.maximum_pressure / PASCALS_PER_BAR,
+        "indicators": _indicator_items(engagement, INDICATORS),
+    }
+
+
+def _indicator_items(
+    found: EngagementIndicators | Comparison, indicators: Mapping[str, Indicator]
+) -> dict[str, dict[str, float] | None]:
+    """Each indicator with its standard error in the public unit; null where it is not determined."""
+    items: dict[str, dict[str, float] | None] = {}
+    for name, indicator in indicators.items():
+        estimate: ValueWithError | None = getattr(found, indicator.field)
+        factor = indicator.factor
+        items[name] = None if estimate is None else {"value": estimate.value / factor, "sd": estimate.sd / factor}
+    return items
+
+
+def course_item(engagement: Engagement | None) -> dict[str, Any]:
+    """What is kept of the sliding speed beside a run's channels; empty for a run without an engagement."""
+    if not isinstance(engagement, EngagementIndicators):
+        return {}
+    course = engagement.course
+    return {
+        COURSE: {
+            "duration_s": course.duration.value,
+            "duration_sd_s": course.duration.sd,
+            "speed_rpm": (course.speed / RADIANS_PER_SECOND_PER_RPM).round(3).tolist(),
+            "noise_rpm": course.noise / RADIANS_PER_SECOND_PER_RPM,
+        }
+    }
+
+
+def public_channels(columns: Mapping[str, FloatArray]) -> dict[str, list[float]]:
+    """Channels of a trace [n] in SI by public name -> in their public units."""
+    return {
+        name: ((column - CHANNELS[name].offset) / CHANNELS[name].factor).round(6).tolist()
+        for name, column in columns.items()
+    }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StoredEngagement:
+    """What is stored of a run with an engagement: its receipt, and the course of speed where it was evaluated."""
+
+    receipt: Mapping[str, Any]
+    course: SpeedCourse | None
+
+    @property
+    def run_id(self) -> str:
+        return str(self.receipt["run_id"])
+
+    @property
+    def item(self) -> Mapping[str, Any]:
+        item: Mapping[str, Any] = self.receipt["engagement"]
+        return item
+
+    def has_duty_of(self, other: "StoredEngagement") -> bool:
+        """Whether it is of the same duty as another, both evaluated."""
+        return all(
+            same_duty(self.item[name], other.item[name]) for name in ("initial_speed_rpm", "maximum_pressure_bar")
+        )
+
+
+def stored_engagement(receipt: Mapping[str, Any], details: Mapping[str, Any]) -> StoredEngagement | None:
+    """A stored run's engagement; None where it has none, or was evaluated by a release that knew of none."""
+    if receipt.get("engagement") is None:
+        return None
+    if COURSE not in details:
+        return StoredEngagement(receipt=receipt, course=None)
+    kept = details[COURSE]
+    course = SpeedCourse(
+        duration=ValueWithError(value=kept["duration_s"], sd=kept["duration_sd_s"]),
+        speed=np.array(kept["speed_rpm"]) * RADIANS_PER_SECOND_PER_RPM,
+        noise=kept["noise_rpm"] * RADIANS_PER_SECOND_PER_RPM,
+    )
+    return StoredEngagement(receipt=receipt, course=course)
+
+
+def engagements_over_life(stored: Sequence[StoredEngagement], lives: Sequence[Collection[str]]) -> list[dict[str, Any]]:
+    """The evaluated engagements in the order given, each with all indicators; `lives` are the run_ids of each life."""
+    rows = []
+    for life in lives:
+        of_life = [engagement for engagement in stored if engagement.run_id in life and engagement.course is not None]
+        first = [engagement for engagement in of_life if engagement.receipt["kind"] == DUTY_KINDS[0]]
+        first = [engagement for engagement in first if engagement.has_duty_of(first[0])][:3]  # three make the reference
+        courses = [engagement.course for engagement in first if engagement.course is not None]
+        reference = reference_of(courses) if courses else None
+        for engagement in of_life:
+            basis = None if reference is None or not engagement.has_duty_of(first[0]) else reference
+            rows.append(_row(engagement, basis))
+    return rows
+
+
+def _row(engagement: StoredEngagement, reference: SpeedCourse | None) -> dict[str, Any]:
+    head = {name: engagement.receipt[name] for name in ("run_id", "cycles", "kind")}
+    item = {name: engagement.item[name] for name in ("initial_speed_rpm", "maximum_pressure_bar")}
+    time = {"time": engagement.receipt["started_at"] or engagement.receipt["received_at"]}
+    if reference is None or engagement.course is None:
+        comparison: dict[str, dict[str, float] | None] = dict.fromkeys(COMPARED)
+    else:
+        comparison = _indicator_items(compared(engagement.course, reference), COMPARED)
+    return head | time | item | {"indicators": engagement.item["indicators"] | comparison}

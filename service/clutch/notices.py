@@ -1,0 +1,192 @@
+"""The warnings of runs and predictions, in words, and which of them a change of the history writes again."""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from models.prognosis.back_cast import BackCast
+from models.prognosis.course_shares import CourseName, CourseProbability
+from models.prognosis.criteria import HORIZON
+from models.prognosis.stated_end import NewLater
+from models.tracking.criteria import FAR
+from models.tracking.innovation import last_innovation
+from models.tracking.measurement import Measurement
+from models.tracking.posterior import TrackPosterior
+from models.tracking.prior import TrackPrior
+from service.channels import ZERO_CELSIUS, bar
+from service.clutch.criteria import EQ_6_DOUBTED, OTHER_OIL
+from service.clutch.items import ENDED, INSUFFICIENT, notice_items, share_of_way
+from service.clutch.timeline import ByPressure, Event, Life, Series, latest_before, nearest
+from service.errors import Notice
+
+#: The warning of a last test that lies far off what the tests before it predict.
+OFF_TRACK = "off_track"
+#: Warnings of a run in its clutch's history, written again where the history changes: it arrived after a run of more cycles,
+#: its pressures or its oil temperature are not those of the first test, its mean COF is not what those before it predict.
+LATE, OTHER_PRESSURES, OTHER_OIL_TEMPERATURE = "late_arrival", "other_pressures", "other_oil_temperature"
+OF_HISTORY = LATE, OTHER_PRESSURES, OTHER_OIL_TEMPERATURE, OFF_TRACK
+
+
+def not_eq_6(courses: Sequence[CourseProbability]) -> list[Notice]:
+    """The warning of a course that eq. 6 cannot take; `courses`: the most probable first."""
+    if any(share.name is CourseName.EQ_6 and share.probability >= EQ_6_DOUBTED for share in courses):
+        return []
+    named = [share for share in courses if share.name is not CourseName.EQ_6]
+    shares = ", ".join(f"{share.name.value.replace('_', ' ')}: {share.probability:.0%}" for share in named)
+    message = (
+        f"the clutch does not age by the usual law ({shares}). The forecast follows the trend of the tests and allows for "
+        "further changes"
+    )
+    return [Notice(code="not_eq6", message=message)]
+
+
+def new_extrapolated(series: Series, late: NewLater | None, fraction: float) -> list[Notice]:
+    """The warning of a clutch that has come more than half of the way to its end before its first test, as tracked: what it
+    was when new then decides, and no test has seen it. A bench's counter that began with another clutch looks the same."""
+    if late is None:
+        return []
+    (cycles, (first, _)), initial = series.as_measured(0), late.extrapolated
+    if (share_of_way(first, initial, fraction * initial) or 0.0) >= 0.5:
+        return []
+    message = (
+        f"the first test is at {cycles:,.0f} cycles with a mean COF of {first:.3g}; extrapolated to 0 cycles it "
+        f"would be {initial:.3g}. With a probability of {late.probability:.0%} the counter began with another clutch, and "
+        "this clutch was new at its first test. The forecast averages over both cases. If the clutch was new, send "
+        f"maintenance with the event rebuild at {cycles:,.0f} cycles: its life then begins there"
+    )
+    return [Notice(code="new_extrapolated", message=message)]
+
+
+def missed(back_cast: BackCast) -> list[Notice]:
+    """The warning of a clutch whose earlier forecasts held too few of the tests since."""
+    if not back_cast.surprising:
+        return []
+    message = (
+        f"the 90 % intervals of earlier forecasts contained only {back_cast.held} of {back_cast.misses.size} later tests. "
+        f"The interval of the remaining life is therefore {back_cast.widening:.2g} times as wide, on a logarithmic scale"
+    )
+    return [Notice(code="missed_forecasts", message=message)]
+
+
+def filters_disagree(answers: Mapping[str, Mapping[str, Any]]) -> list[Notice]:
+    """The warning where a filter's median lies outside another's 90 % interval, of predictions by their method."""
+    predictions = {m: a["remaining_cycles"] for m, a in answers.items() if a["status"] not in (INSUFFICIENT, ENDED)}
+    ends = [
+        [math.inf if prediction[q] is None else prediction[q] for q in ("0.05", "0.5", "0.95")]
+        for prediction in predictions.values()
+    ]
+    if all(low <= median <= high for low, _, high in ends for _, median, _ in ends):
+        return []
+    intervals = "; ".join(f"{interval_in_words(prediction)} by {method}" for method, prediction in predictions.items())
+    message = f"the methods disagree about the remaining cycles: {intervals}. Plan with the lowest, and test again soon"
+    return [Notice(code="filters_disagree", message=message)]
+
+
+def interval_in_words(remaining: Mapping[str, float | None]) -> str:
+    """A median of remaining cycles with its 90 % interval."""
+    low, median, high = (remaining[quantile] for quantile in ("0.05", "0.5", "0.95"))
+    if median is None:
+        return "an unknown number of" if low is None else f"at least {low:,.0f}"
+    upper = f"over {max(HORIZON, median):,.0f}" if high is None else f"{high:,.0f}"
+    return f"{median:,.0f} (90 %: {low:,.0f} to {upper})"
+
+
+def off_track(posterior: TrackPosterior, measurements: Sequence[Measurement], prior: TrackPrior) -> list[Notice]:
+    """The warning of a last test that lies far off what the tests before it predict, and no event lies between."""
+    deviations = last_innovation(posterior, measurements, prior)
+    if deviations is None or not abs(deviations) > FAR:
+        return []
+    side = "below" if deviations < 0 else "above"
+    size = f"{abs(deviations):.1f}" if math.isfinite(deviations) else "very many"
+    message = (
+        f"the last test's mean COF of {measurements[-1].value:.4g} is {size} standard deviations {side} its prediction from "
+        "the earlier tests. Repeat the test: if the value stays, the clutch has changed"
+    )
+    return [Notice(code=OFF_TRACK, message=message)]
+
+
+def new_level(cycles: Sequence[float]) -> list[Notice]:
+    """The warning of tests at these cycles since new from which on COF has a new level, and no event explains it."""
+    if not cycles:
+        return []
+    message = (
+        f"mean COF has a new level since the test at {' and at '.join(f'{at:,.0f}' for at in cycles)} cycles, and no "
+        "event explains it. Look at the lining and the sensors; if something was changed, send it as maintenance"
+    )
+    return [Notice(code="new_level", message=message)]
+
+
+def late_arrival(cycles: float, latest: float) -> list[Notice]:
+    """A run that arrived after another of more cycles; `latest` are the most of those that were there."""
+    if cycles >= latest:
+        return []
+    message = (
+        f"this run at {cycles:g} cycles arrived after one at {latest:g}: the results of this life were computed again"
+    )
+    return [Notice(code=LATE, message=message)]
+
+
+def other_pressures_notice(reference: ByPressure, cofs: ByPressure) -> list[Notice]:
+    """A test that cannot be compared with the reference test: none of its pressures is one of that's."""
+    if not cofs or any(nearest(level, cofs) is not None for level in reference):
+        return []
+    measured = ", ".join(f"{bar(level):g}" for level in sorted(reference))
+    message = (
+        f"this test has no pressure of the first test ({measured} bar), so it does not count for the remaining life"
+    )
+    return [Notice(code=OTHER_PRESSURES, message=message)]
+
+
+def left_out(tests: int, runs: int) -> list[Notice]:
+    """The warning of a life of so many tests of which only these `runs` can be compared with the first."""
+    if runs >= tests:
+        return []
+    verb = "does" if tests - runs == 1 else "do"
+    message = (
+        f"{tests - runs} of {tests} tests {verb} not count: the pressures differ from those of the first test, or the "
+        f"oil temperature by more than {OTHER_OIL:g} °C. The warnings of each run say which"
+    )
+    return [Notice(code="tests_left_out", message=message)]
+
+
+def other_oil_notice(life: Life, event: Event) -> list[Notice]:
+    """A test in oil that is much warmer or colder than the reference test's."""
+    if not life.in_other_oil(event) or event.oil_temperature is None or life.reference_oil is None:
+        return []
+    oil, reference = (kelvin - ZERO_CELSIUS for kelvin in (event.oil_temperature, life.reference_oil))
+    message = (
+        f"the mean oil temperature was {oil:.0f} °C in this test and {reference:.0f} °C in the first, more than "
+        f"{OTHER_OIL:g} °C apart. The test counts only under an adopted model that corrects for oil temperature"
+    )
+    return [Notice(code=OTHER_OIL_TEMPERATURE, message=message)]
+
+
+def history_warnings(
+    lives: Sequence[Life], off_track: Mapping[str, list[dict[str, str]]], *, run_id: str | None = None
+) -> dict[str, list[dict[str, str]]]:
+    """run_id -> the warnings of every run in its history, or of one; `off_track` are those of predictions after tests."""
+    latest = latest_before([event for life in lives for event in life.events])
+    return {
+        event.run_id: [
+            *notice_items(late_arrival(event.cycles, latest[event.run_id])),
+            *notice_items(other_pressures_notice(life.reference, event.cofs)),
+            *notice_items(other_oil_notice(life, event)),
+            *off_track.get(event.run_id, ()),
+        ]
+        for life in lives
+        for event in life.events
+        if run_id is None or event.run_id == run_id
+    }
+
+
+def warned_again(
+    lives: Sequence[Life], off_track: Mapping[str, list[dict[str, str]]], receipts: Mapping[str, dict[str, Any]]
+) -> dict[str, dict[str, Any]]:
+    """The receipts whose warnings of the history change."""
+    changed = {}
+    for run_id, noticed in history_warnings(lives, off_track).items():
+        before = receipts[run_id]["warnings"]
+        after = [warning for warning in before if warning["code"] not in OF_HISTORY] + noticed
+        if after != before:
+            changed[run_id] = receipts[run_id] | {"warnings": after}
+    return changed

@@ -1,0 +1,239 @@
+"""The doubts about runs, in words: what is odd, the value, the expected value, the likely mistake, and what to do.
+
+Dead channels are found in a run by itself, and nothing that other runs show takes them back. All else is one question
+over all runs, `models.plausibility.judgement`, asked again whenever a run comes in or is changed.
+"""
+
+import bisect
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import reduce
+
+from models.clutch import Geometry
+from models.plausibility import criteria
+from models.plausibility.judgement import JointJudgement, SlipVerdict, judge
+from models.plausibility.slips import OF_CYCLES, OTHER_CYCLES, RunReading
+from service.channels import PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM, ZERO_CELSIUS
+from service.clutch.analysis import Analysis
+from service.clutch.incoming_run import IncomingRun
+from service.clutch.plausibility.reading import DEAD, DEAD_PRESSURE, columns_of, dead_channels, runs_of, shown_by
+from service.clutch.timeline import Event, Shown, beyond_end, order, with_event
+from service.errors import Notice
+
+OFF_PACE, AGAINST_TIME = "cycles_off_pace", "cycles_against_time"
+BEYOND_PHYSICS, OFF_COURSE = "cof_beyond_physics", "cof_off_course"
+UNIT = "unit"
+
+
+def doubt(verdict: SlipVerdict, sent: RunReading, shown: Shown) -> Notice:
+    """The doubt of which the verdict's slip is the most probable explanation."""
+    slip = verdict.slip
+    if slip.name in OF_CYCLES:
+        return _cycles_notice(verdict, sent)
+    if slip.unit and (slip.name in ("oil", "speed") or _expected_then(verdict)):
+        return _unit_notice(verdict, shown)
+    if slip.name == DEAD_PRESSURE:
+        message = (
+            f"by its pressure the clutch is open, but a torque of {shown.open_torque or 0.0:.3g} Nm needs a closed one: "
+            "is the pressure sensor connected? Withdraw the run, or confirm it."
+        )
+        return Notice(code=DEAD, message=message)
+    return _cof_notice(verdict, sent)
+
+
+def negative(cof: float) -> Notice:
+    """The doubt of a torque that pushes."""
+    message = (
+        f"torque drives the clutch instead of braking it (COF {cof:.3g}): is the sign of torque or speed wrong? "
+        "Send the run with the right sign, or confirm it."
+    )
+    return Notice(code=BEYOND_PHYSICS, message=message)
+
+
+def _cycles_notice(verdict: SlipVerdict, sent: RunReading) -> Notice:
+    sentences = [_gap(verdict, sent.cycles)]
+    if verdict.against_time:
+        sentences.append("Its date (started_at) does not fit the order of the cycles.")
+    if verdict.expected is not None and sent.log_cof is not None:
+        (low, high), cof = verdict.expected, math.exp(sent.log_cof)
+        if not low <= cof <= high:
+            sentences.append(f"Its mean COF is {cof:.3g}; {low:.3g} to {high:.3g} is expected at these cycles.")
+    guessed = verdict.slip.name != OTHER_CYCLES and verdict.latest is not None
+    likely = verdict.slip.likely.cycles if guessed else None
+    ask = "" if likely is None else f"Is it {_number(likely)}? "
+    message = " ".join([*sentences, f"{ask}Confirm or correct it."])
+    return Notice(code=AGAINST_TIME if verdict.against_time else OFF_PACE, message=message, likely_cycles=likely)
+
+
+def _gap(verdict: SlipVerdict, cycles: float) -> str:
+    if verdict.latest is None:
+        return f"{_number(cycles)} cycles are more than any clutch lasts."
+    if verdict.before is None or cycles <= verdict.latest + 0.5:
+        return (
+            f"{_number(cycles)} cycles lie between those of other runs; the last run was at {_number(verdict.latest)}."
+        )
+    gap = f"{_number(cycles)} cycles are {_number(cycles - verdict.before)} after the previous run"
+    usual = verdict.usual_gap
+    return f"{gap}." if usual is None else f"{gap}; earlier runs were about {_number(usual)} cycles apart."
+
+
+def _unit_notice(verdict: SlipVerdict, shown: Shown) -> Notice:
+    slip = verdict.slip
+    if slip.name == "oil":
+        oil = (shown.oil or 0.0) - ZERO_CELSIUS
+        message = f"oil temperature is {oil:.4g} °C: was it sent in {slip.unit}?"
+    else:
+        of = {
+            "pressure": f"pressure is up to {(shown.pressure or 0.0) / PASCALS_PER_BAR:.4g} bar",
+            "torque": "torque",
+            "speed": f"speed is up to {(shown.speed or 0.0) / RADIANS_PER_SECOND_PER_RPM:.4g} rpm",
+        }[slip.name]
+        low, high = verdict.expected or (math.inf, -math.inf)
+        if shown.cof is None or low <= shown.cof <= high:
+            odd = ", unlike in other tests"
+        else:
+            odd = f"{'' if slip.name == 'torque' else ' and'} gives a COF of {shown.cof:.3g}{_expected(verdict)}"
+        message = f"{of}{odd}: was it sent in {slip.unit}?"
+    return Notice(code=UNIT, message=f"{message} Withdraw the run and send it in the channel's unit, or confirm it.")
+
+
+def _expected_then(verdict: SlipVerdict) -> bool:
+    """Whether COF without the slip is as expected: else no unit is asked for, though it explains a part."""
+    likely = verdict.slip.likely
+    if verdict.expected_then is None or likely.log_cof is None:
+        return True
+    return verdict.expected_then[0] <= math.exp(likely.log_cof) <= verdict.expected_then[1]
+
+
+def _expected(verdict: SlipVerdict) -> str:
+    if verdict.expected is None:
+        return ""
+    return f", where {verdict.expected[0]:.3g} to {verdict.expected[1]:.3g} is expected"
+
+
+def _cof_notice(verdict: SlipVerdict, sent: RunReading) -> Notice:
+    cof = math.exp(sent.log_cof or -20.0)
+    beyond = abs(math.log(cof / criteria.COF)) / criteria.LOG_COF_SD > 2.5
+    cause = "Is a sensor or a unit wrong?" if beyond else "Is it another clutch's test?"
+    at = f"at {_number(sent.cycles)} cycles{_expected(verdict)}"
+    message = f"mean COF is {cof:.3g} {at}. {cause} Withdraw the run, or confirm it."
+    return Notice(code=BEYOND_PHYSICS if beyond else OFF_COURSE, message=message)
+
+
+def _number(value: float) -> str:
+    return f"{value:.0f}" if float(value).is_integer() else f"{value:g}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Judged:
+    """What the joint judgement says: the doubts about each run that is to be held, by run_id; the runs that were held and
+    are now accepted, those that were accepted and are now held, and why, by run_id; whether a test begins a new level that
+    did not, or does not that did, by run_id."""
+
+    doubts: Mapping[str, tuple[Notice, ...]] = field(default_factory=dict)
+    accepted: tuple[Event, ...] = ()
+    held: tuple[Event, ...] = ()
+    reasons: Mapping[str, str] = field(default_factory=dict)
+    levels: Mapping[str, bool] = field(default_factory=dict)
+
+    @property
+    def changes(self) -> bool:
+        """Whether anything changes of what was there already."""
+        return bool(self.accepted or self.held or self.levels)
+
+    def settled(self, events: Sequence[Event], further: Sequence[Event] = ()) -> tuple[Event, ...]:
+        """The accepted runs as they are from now on: `events` were accepted before, `further` come in accepted."""
+        gone = {event.run_id for event in self.held}
+        settled = order([*(event for event in events if event.run_id not in gone), *self.accepted, *further])
+        return tuple(replace(event, new_level=self.levels.get(event.run_id, event.new_level)) for event in settled)
+
+    def aside(self, held: Sequence[Event], further: Sequence[Event]) -> tuple[Event, ...]:
+        """The held runs as they are from now on: `held` were before, `further` come in held."""
+        back = {event.run_id for event in self.accepted}
+        return order([*(event for event in held if event.run_id not in back), *self.held, *further])
+
+
+def doubts_alone(run: IncomingRun, analysis: Analysis, geometry: Geometry) -> tuple[Shown | None, tuple[Notice, ...]]:
+    """What the rows of a run show, and what is odd about them whatever other runs show; None and why where a channel is
+    dead."""
+    columns = columns_of(run, analysis)
+    odd = [] if columns is None else dead_channels(run.kind, columns, geometry)
+    if odd:
+        return None, tuple(odd)
+    shown = shown_by(columns, geometry)
+    if shown.cof is not None and shown.cof <= 0:
+        return None, (negative(shown.cof),)
+    return shown, ()
+
+
+def doubts_together(
+    accepted: tuple[Event, ...],
+    held: Sequence[Event],
+    incoming: Event | None,
+    geometry: Geometry,
+    *,
+    corrected: bool,
+    changed: Sequence[Event] = (),
+) -> Judged:
+    """Which runs are to be held, all of them weighed together.
+
+    `accepted` and `held` are the runs as they stand, `incoming` one that comes in or was changed (None: none is new),
+    `changed` those that were changed or taken out: what lies about them is looked at. `corrected`: a model in force
+    corrects the mean COFs of tests.
+    """
+    new = [] if incoming is None else [incoming]
+    doubted = _doubted(accepted, held, new)
+    events = reduce(with_event, [*doubted, *new], accepted)
+    runs = runs_of(events, geometry, corrected=corrected)
+    place = {run.name: index for index, run in enumerate(runs)}
+    cycles = [event.cycles for event in events]
+    about = [min(bisect.bisect_left(cycles, event.cycles), len(events) - 1) for event in changed if events]
+    judgement = judge(runs, [*(place[event.run_id] for event in [*doubted, *new]), *about])
+    levels = _levels(events, judgement)
+    if incoming is None and not doubted:  # what somebody has changed is no reason to hold other runs
+        return Judged(levels=levels)
+    doubts = {
+        runs[index].name: (doubt(verdict, runs[index].sent, events[index].shown or Shown()),)
+        for index, verdict in judgement.held.items()
+    }
+    back = tuple(event for event in doubted if event.run_id not in doubts)
+    gone = tuple(event for event in accepted if event.run_id in doubts)
+    counted = [event for event in events if event.run_id not in doubts]
+    reasons = {event.run_id: f"agrees with {_names_of_nearest_runs(event, counted)}" for event in back}
+    reasons |= {event.run_id: f"does not agree with {_names_of_nearest_runs(event, counted)}" for event in gone}
+    return Judged(doubts=doubts, accepted=back, held=gone, reasons=reasons, levels=levels)
+
+
+def levelled(
+    accepted: Sequence[Event], held: Sequence[Event], geometry: Geometry, *, corrected: bool
+) -> tuple[Event, ...]:
+    """The accepted runs with the new levels that they show; arguments as of `doubts_together`, which says the same."""
+    doubted = _doubted(accepted, held)
+    events = order([*accepted, *doubted])
+    names = {event.run_id for event in doubted}
+    about = [index for index, event in enumerate(events) if event.run_id in names]
+    judgement = judge(runs_of(events, geometry, corrected=corrected), about)
+    return Judged(levels=_levels(events, judgement)).settled(accepted)
+
+
+def _doubted(accepted: Sequence[Event], held: Sequence[Event], new: Sequence[Event] = ()) -> list[Event]:
+    """The held runs that are part of the question: without a dead channel, and not after the declared end of their life."""
+    return [event for event in held if event.shown is not None and beyond_end(order([*accepted, *new, event])) is None]
+
+
+def _levels(events: Sequence[Event], judgement: JointJudgement) -> dict[str, bool]:
+    """Whether a test begins a new level that did not, or does not that did, by run_id."""
+    return {
+        events[index].run_id: index in judgement.levels
+        for index in judgement.tests
+        if events[index].new_level is not (index in judgement.levels)
+    }
+
+
+def _names_of_nearest_runs(event: Event, counted: Sequence[Event]) -> str:
+    """The runs nearest to one in the history, of its kind where there are any, by their names."""
+    other_runs = [other for other in counted if other.run_id != event.run_id]
+    alike = [other for other in other_runs if other.kind == event.kind] or other_runs
+    nearest = sorted(alike, key=lambda other: (abs(other.cycles - event.cycles), other.run_id))[:3]
+    return ", ".join(other.run_id for other in nearest) or "no other run"

@@ -1,0 +1,358 @@
+"""The state of a clutch as one value, and all results that are computed from it; nothing here uses a database.
+
+A change loads a `ClutchHistory`, computes `Results` with the functions below, and stores them in one short transaction that
+checks that the state's revision is still the newest. An `Arrival` is a run as it comes in, among the stored ones. Where
+the filters may go one step on from their stored states, and where a life is tracked again, is decided here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, Any
+
+from models.clutch import Geometry
+from models.degradation.severity import Severity
+from models.diagnosis.campaign import StationaryRun
+from service.api.clutch import ClutchIn
+from service.clutch import timeline
+from service.clutch.analysis import Analysis, LevelFit, loops_of, mean_cofs
+from service.clutch.assumptions import Assumptions, LearnedPrior, kind_of, severity_under
+from service.clutch.condition import SHOWN
+from service.clutch.diagnosis.campaign import head_of
+from service.clutch.incoming_run import IncomingRun
+from service.clutch.items import fit_items, loop_items
+from service.clutch.model_correction import RunReader, corrected_cofs, model_in_force
+from service.clutch.notices import OF_HISTORY, OFF_TRACK, warned_again
+from service.clutch.plausibility.doubts import Judged, levelled
+from service.clutch.tracking import CARRIED, States, TrackPrediction, follow
+from service.errors import Notice
+
+if TYPE_CHECKING:
+    from models.diagnosis.extension import Extension
+
+#: The levels of stationary tests by run_id.
+Levels = Mapping[str, Sequence[LevelFit]]
+Receipt = dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Adoption:
+    """A diagnosis whose extension was adopted, and the life that it was made of."""
+
+    diagnosis_id: str
+    life: str
+    extension: Extension
+
+
+def newest_adoption(adoptions: Iterable[Adoption | None], lives: Collection[str]) -> Adoption | None:
+    """The newest of what was adopted (None: the baseline), newest first: one of a life whose rebuild is none of the lives
+    any more (it was withdrawn) is passed over."""
+    return next(
+        (adoption for adoption in adoptions if adoption is None or not adoption.life or adoption.life in lives), None
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class ClutchHistory:
+    """What the next run's results depend on, at one revision. What follows from it is found once.
+
+    `events` are all accepted runs in the order of the history, mean COF as the model in force corrects it; `held` those that
+    are held, with the mean COFs that they would have in it; `adoptions` what was adopted, newest first (None: the baseline);
+    `priors` what fleets have taught for each severity that may come into force; `filters` the filters' states after the last
+    test, None where another release stored them; `summary` what is stored of the clutch's condition.
+    """
+
+    record: ClutchIn
+    revision: int
+    events: tuple[timeline.Event, ...]
+    adoptions: tuple[Adoption | None, ...]
+    priors: Mapping[Severity, LearnedPrior]
+    filters: States | None = None
+    held: tuple[timeline.Event, ...] = ()
+    summary: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def clutch_id(self) -> str:
+        return self.record.clutch_id
+
+    @cached_property
+    def geometry(self) -> Geometry:
+        return self.record.geometry.to_model()
+
+    @property
+    def fraction(self) -> float:
+        """The share of the initial mean COF that ends a life."""
+        return self.record.end_of_life.cof_fraction
+
+    @cached_property
+    def lives(self) -> tuple[timeline.Life, ...]:
+        """The timeline cut at its rebuilds."""
+        return tuple(timeline.lives_of(self.events))
+
+    @cached_property
+    def adoption(self) -> Adoption | None:
+        """What was adopted last of the lives that are in the history."""
+        return newest_adoption(self.adoptions, [life.name for life in self.lives])
+
+    @cached_property
+    def extension(self) -> Extension | None:
+        """The extension that the present life is tracked under, None under the baseline: a rebuild ends an adoption."""
+        name, adoption = self.lives[-1].name if self.events else "", self.adoption
+        return adoption.extension if adoption is not None and adoption.life == name else None
+
+    @property
+    def kind(self) -> dict[str, Any]:
+        return kind_of(self.record, self.assumptions().severity)
+
+    def assumptions(self) -> Assumptions:
+        return self._assumptions
+
+    @cached_property
+    def _assumptions(self) -> Assumptions:
+        return self.assumptions_under(self.extension, self.lives[-1] if self.events else None)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What follows from the state is not sent to another process."""
+        return {field.name: getattr(self, field.name) for field in fields(self)}
+
+    def assumptions_under(self, extension: Extension | None, life: timeline.Life | None) -> Assumptions:
+        """What a life would be tracked under, were this extension in force."""
+        model = model_in_force(extension, life, self.geometry)
+        severity = severity_under(self.record, model.severity_exponent)
+        return Assumptions(severity=severity, prior=self.priors[severity], model=model)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tracking:
+    """Predictions after events, the filters' states after the last, and by run_id the warnings of the predictions right
+    after tests; `again` where all that was predicted before is replaced."""
+
+    predictions: tuple[TrackPrediction, ...] = ()
+    filters: States = field(default_factory=dict)
+    warnings: Mapping[str, list[dict[str, str]]] = field(default_factory=dict)
+    again: bool = True
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Results:
+    """What is to be stored of a clutch: mean COFs by run_id beside their levels, receipts that change, corrected mean COFs
+    (in place of all where `corrected_again`), the tracking and the summary (None: it stays); `details`, which stand beside a
+    run's channels, of runs that were analysed again; what changes in the doubts about other runs; and, where it changes what
+    an ended life teaches, the kind of clutches that it `teaches`."""
+
+    levels: Levels = field(default_factory=dict)
+    cofs: Mapping[str, timeline.ByPressure] = field(default_factory=dict)
+    receipts: Mapping[str, Receipt] = field(default_factory=dict)
+    details: Mapping[str, dict[str, Any]] = field(default_factory=dict)
+    corrected: Mapping[str, timeline.Corrected] = field(default_factory=dict)
+    corrected_again: bool = False
+    tracking: Tracking | None = None
+    summary: dict[str, Any] | None = None
+    judged: Judged = field(default_factory=Judged)
+    teaches: dict[str, Any] | None = None
+
+
+def computed_again(
+    state: ClutchHistory,
+    levels: Levels,
+    receipts: Mapping[str, Receipt],
+    reader: RunReader,
+    *,
+    evaluated: Mapping[str, str | None],
+) -> tuple[ClutchHistory, Results]:
+    """Mean COFs over the protocol of each life, freed of the artefacts of the model in force, and all tracked again.
+
+    `levels` and `receipts` are those of all runs; `evaluated` as `loops_again` takes it. Returns the state with its mean
+    COFs, and what is to be stored.
+    """
+    final, cofs, corrected = with_cofs(state, levels, reader)
+    fresh = {run_id: receipts[run_id] | {"fits": fit_items(levels[run_id], cofs[run_id])} for run_id in cofs}
+    for run_id, items in loops_again(final, levels, reader, evaluated).items():
+        fresh[run_id] = receipts[run_id] | {"loops": items}
+    tracking = track(final)
+    results = Results(
+        levels={run_id: levels[run_id] for run_id in cofs},
+        cofs=cofs,
+        receipts=fresh | warned_again(final.lives, tracking.warnings, {**receipts, **fresh}),
+        corrected=corrected,
+        corrected_again=True,
+        tracking=tracking,
+    )
+    return final, results
+
+
+def with_cofs(
+    state: ClutchHistory, levels: Levels, reader: RunReader
+) -> tuple[ClutchHistory, dict[str, timeline.ByPressure], dict[str, timeline.Corrected]]:
+    """The state with the mean COFs of its events and the new levels that these show, the COFs that the fits give by run_id,
+    and those that the model in force corrects; arguments as of `computed_again`."""
+    cofs = _cofs_of_tests(state.lives, levels, state.geometry)
+    events = tuple(replace(event, cofs=cofs.get(event.run_id, {}), under={}) for event in state.events)
+    plain = replace(state, events=events)
+    corrected: dict[str, timeline.Corrected] = {}
+    if plain.extension is not None and plain.events:
+        life = plain.lives[-1]
+        runs = reader.campaign_runs(life.events, origin=life.origin)
+        corrected = corrected_cofs(plain.extension, plain.record, life, runs, reader.stationary_tests(life))
+    freed = [event.corrected(corrected.get(event.run_id)) for event in plain.events]
+    events = levelled(freed, state.held, state.geometry, corrected=state.extension is not None)
+    return replace(plain, events=events), cofs, corrected
+
+
+def cofs_among(state: ClutchHistory, event: timeline.Event, levels: Sequence[LevelFit]) -> timeline.ByPressure:
+    """A run's mean COFs as they are, or would be, in the history: over the protocol of its life's first stationary test,
+    which may be itself."""
+    life = timeline.life_with(timeline.with_event(state.events, event), event)
+    return _cofs_of_tests([life], {event.run_id: levels}, state.geometry).get(event.run_id, {})
+
+
+def with_set_aside(
+    computed: Results,
+    state: ClutchHistory,
+    events: Iterable[timeline.Event],
+    levels: Levels,
+    receipts: Mapping[str, Receipt],
+    reader: RunReader,
+) -> Results:
+    """The results with those of runs that are none of the history: their mean COFs and loops as they would be among it, and
+    receipts without the warnings of the history."""
+    cofs, fresh, own_levels = {**computed.cofs}, {**computed.receipts}, {**computed.levels}
+    for event in events:
+        name, fits = event.run_id, levels.get(event.run_id, ())
+        state_with_event = replace(state, events=timeline.order([*state.events, event]))
+        evaluated = timeline.stationary_tests_of(state_with_event.events)
+        evaluated.pop(name, None)
+        loops = loops_again(state_with_event, levels, reader, evaluated).get(name, [])
+        cofs[name], own_levels[name] = cofs_among(state, event, fits), fits
+        warnings = [warning for warning in receipts[name]["warnings"] if warning["code"] not in OF_HISTORY]
+        fresh[name] = receipts[name] | {"fits": fit_items(fits, cofs[name]), "loops": loops, "warnings": warnings}
+    return replace(computed, cofs=cofs, levels=own_levels, receipts=fresh)
+
+
+def _cofs_of_tests(
+    lives: Sequence[timeline.Life], levels: Levels, geometry: Geometry
+) -> dict[str, timeline.ByPressure]:
+    """Mean COF of every test that has curves, over the protocol of its life's first test."""
+    cofs: dict[str, timeline.ByPressure] = {}
+    for life in lives:
+        velocities = None if life.speed_range is None else timeline.reference_velocities(life.speed_range, geometry)
+        for event in life.events:
+            if levels.get(event.run_id):
+                fits = levels[event.run_id]
+                cofs[event.run_id] = {} if velocities is None else mean_cofs(fits, velocities, geometry)
+    return cofs
+
+
+def corrected_newest(
+    state: ClutchHistory, newest: timeline.Event, test: StationaryRun | None, reader: RunReader
+) -> timeline.Corrected | None:
+    """The mean COFs of the test that comes last, freed of artefacts of the model in force; None where nothing changes."""
+    if state.extension is None or newest.speed_range is None or test is None:
+        return None
+    life = state.lives[-1]
+    runs = reader.campaign_runs(life.events[:-1], origin=life.origin)
+    return corrected_cofs(state.extension, state.record, life, runs, [test]).get(newest.run_id)
+
+
+def track(state: ClutchHistory, *, newest: timeline.Event | None = None) -> Tracking:
+    """Track what the history asks for: one step where `newest` comes last and the filters' states serve, else all of it."""
+    if not state.events:
+        return Tracking()
+    assumptions, lives = state.assumptions(), state.lives
+    last = lives[-1].pooled(assumptions)
+    carried = None if newest is None else _carried(state, lives[-1], last, newest)
+    first = 0 if carried is None else len(lives[-1].events) - 1
+    walks: list[tuple[timeline.Life, timeline.Series, States, int]] = [(lives[-1], last, carried or {}, first)]
+    if carried is None:
+        walks[:0] = [(life, life.pooled(assumptions), {}, 0) for life in lives[:-1]]
+    predictions: dict[tuple[float, str], TrackPrediction] = {}
+    filters: States = {}
+    warnings: dict[str, list[dict[str, str]]] = {}
+    for life, full_life, start, first_event in walks:
+        measured = set(full_life.events)
+        walk = follow(life, full_life, state.fraction, start, first_event=first_event)
+        for index, (after_event, after_test) in enumerate(walk, start=first_event):
+            filters = after_event
+            predictions |= {(prediction.cycles, prediction.method): prediction for prediction in after_test}
+            if index in measured:
+                shown = predictions[life.events[index].cycles, SHOWN].payload
+                odd = [warning for warning in shown["warnings"] if warning["code"] == OFF_TRACK]
+                warnings[life.events[index].run_id] = odd
+    return Tracking(predictions=tuple(predictions.values()), filters=filters, warnings=warnings, again=carried is None)
+
+
+def _carried(
+    state: ClutchHistory, life: timeline.Life, whole: timeline.Series, newest: timeline.Event
+) -> States | None:
+    """The stored states from before `newest`, or None where one step on from them would not give the same answer."""
+    last = life.events[-1]
+    is_test = newest.speed_range is not None
+    index = (
+        len(life.events) - 1
+        if newest is last
+        else next((place for place, event in enumerate(life.events) if event is newest), -1)
+    )
+    if newest.rebuild or index < 0 or (newest is not last and (is_test or newest.cycles < last.cycles)):
+        return None
+    if (newest is not last and newest.shift) or state.filters is None:
+        return None
+    before = sum(1 for event in whole.events if event != index)
+    if state.filters.keys() != (set(CARRIED) if before else set()):
+        return None
+    return None if any(tracked.runs != before for tracked in state.filters.values()) else state.filters
+
+
+def loops_again(
+    state: ClutchHistory, levels: Levels, reader: RunReader, evaluated: Mapping[str, str | None]
+) -> dict[str, list[dict[str, Any]]]:
+    """run_id -> loops of the dynamic tests that have another stationary test than that which they were `evaluated` against,
+    by run_id; of those that are not there, too."""
+    loops = {}
+    for run_id, test in timeline.stationary_tests_of(state.events).items():
+        if run_id not in evaluated or evaluated[run_id] != test:
+            fits = [] if test is None else levels.get(test, [])
+            loops[run_id] = loop_items(
+                loops_of(reader.read(run_id).channels, state.geometry, state.record.torque_filter, fits)
+            )
+    return loops
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Arrival:
+    """A run by itself: as it came in, whether it is a sampled record, its own results, what its rows show of friction and
+    what is odd about them, and when it was received."""
+
+    run: IncomingRun
+    sampled: bool
+    analysis: Analysis
+    shown: timeline.Shown | None
+    odd: tuple[Notice, ...]
+    received_at: str
+
+    @property
+    def kept(self) -> dict[str, Any]:
+        return self.analysis.details_to_store(self.run) | (
+            {} if self.shown is None else {"shown": self.shown.to_list()}
+        )
+
+
+def test_of(arrival: Arrival, life: timeline.Life) -> StationaryRun | None:
+    """The run as a stationary test of a life, by the plateaus that were cut already."""
+    plateaus, times = arrival.analysis.plateaus, arrival.analysis.times
+    if plateaus is None:
+        return None
+    return StationaryRun(**head_of(arrival.run, life.origin), plateaus=plateaus, time=times)
+
+
+def reader_with(stored: RunReader, arrival: Arrival) -> RunReader:
+    """The stored runs, and the one that comes in."""
+    name = arrival.run.run_id
+    return replace(
+        stored,
+        read=lambda run_id: arrival.run if run_id == name else stored.read(run_id),
+        describe=lambda run_id: arrival.run if run_id == name else stored.describe(run_id),
+        sampled=stored.sampled | ({name} if arrival.sampled else frozenset()),
+        cut={name: partial(test_of, arrival)},
+    )

@@ -1,0 +1,494 @@
+"""A clutch's history as series over duty cycles, for the filters.
+
+Runs may have arrived in any order; the history is ordered by cycles (see `order`). A rebuild starts a new life: cycles
+count from it, and the first stationary test after it is the new reference. Any other maintenance begins an epoch: it may
+have shifted the level of what is measured.
+"""
+
+import bisect
+import itertools
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import astuple, dataclass, field, fields, replace
+from datetime import UTC, datetime
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from models.arrays import FloatArray
+from models.clutch import Geometry
+from models.degradation.severity import Block
+from models.friction.speed_protocol import protocol_speeds
+from models.records.criteria import LEVEL_GAP, LEVEL_GAP_SHARE
+from models.tracking.measurement import Measurement
+from models.tracking.prior import TrackPrior
+from service.channels import RADIANS_PER_SECOND_PER_RPM
+from service.clutch.analysis import Value
+from service.clutch.assumptions import ALL_PRESSURES, MEAN_COF, Assumptions, Scale
+from service.clutch.criteria import OTHER_OIL
+from service.errors import LifeEndedError
+
+ByPressure = Mapping[float, Value]
+#: Pressure [Pa] -> mean COF as the model in force corrects it, its deviation, and mean COF under each of the model's draws.
+Corrected = Mapping[float, tuple[float, float, tuple[float, ...]]]
+
+#: Kinds of runs.
+STATIONARY, DYNAMIC, MAINTENANCE = "stationary_stribeck", "dynamic_stribeck", "maintenance"
+REBUILD, END_OF_LIFE = "rebuild", "end_of_life"
+#: Why a life was declared ended: it is worn, or it was taken out before its end, which is later then.
+WORN = "worn"
+#: The first and the last moment that have a date [s since 1970].
+_MOMENTS = tuple(moment.replace(tzinfo=UTC).timestamp() for moment in (datetime.min, datetime(9999, 12, 31)))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Shown:
+    """What the rows of a run show of friction: mean COF over the speeds [-], of either sign, the highest pressure [Pa] and
+    speed [rad/s], the median of the oil's temperature [K]; of an open clutch the median torque [Nm]. None: not shown."""
+
+    cof: float | None = None
+    pressure: float | None = None
+    speed: float | None = None
+    oil: float | None = None
+    open_torque: float | None = None
+
+    def to_list(self) -> list[float | None]:
+        """The numbers in the order of the fields."""
+        return list(astuple(self))
+
+    @classmethod
+    def from_list(cls, numbers: Sequence[float | None]) -> "Shown":
+        """The inverse."""
+        return cls(**{field.name: number for field, number in zip(fields(cls), numbers, strict=True)})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Event:
+    """A run as the history sees it.
+
+    `moment` is when it was made [s], `dated` whether the rig said so, `arrived` its place in the order of arrival, infinite
+    while it comes in. A stationary test has the range of its speeds [rad/s], its mean oil temperature [K], and mean COF with
+    its deviation by pressure [Pa] where its curves determine it, and `under` each draw of the model in force where that
+    corrects it; `duty` is the block that ends with the run, `shift` an event that may have shifted the level, `end` why the
+    life was declared ended with it; `shown` what its rows show (None: a channel is dead, so that no other run bears on
+    whether it is held), `confirmed` whether somebody confirmed it.
+    """
+
+    run_id: str
+    kind: str
+    cycles: float
+    moment: float
+    arrived: float = math.inf
+    speed_range: Value | None = None
+    oil_temperature: float | None = None
+    cofs: ByPressure = field(default_factory=dict)
+    rebuild: bool = False
+    shift: bool = False
+    end: str | None = None
+    duty: Block | None = None
+    dated: bool = False
+    shown: Shown | None = None
+    confirmed: bool = False
+    new_level: bool = False
+    under: Mapping[float, tuple[float, ...]] = field(default_factory=dict)
+    _pooled: list[Any] = field(default_factory=list, init=False, repr=False, compare=False)
+    _measured: list[Any] = field(default_factory=list, init=False, repr=False, compare=False)
+
+    def measured(self, progress: float, value: float, sd: float, epoch: int, new_levels: int) -> Measurement:
+        """A measurement of mean COF over the pressures with these numbers, kept for the last ones."""
+        numbers = (progress, value, sd, epoch, new_levels)
+        if not self._measured or self._measured[0] != numbers:
+            measurement = Measurement(
+                progress=progress, value=value, variance=sd**2, epoch=epoch, new_levels=new_levels
+            )
+            self._measured[:] = [numbers, measurement]
+        made: Measurement = self._measured[1]
+        return made
+
+    def pooled(self, reference: ByPressure) -> Value | None:
+        """`pooled_value` of its mean COFs, kept for the last reference."""
+        if not self._pooled or self._pooled[0] is not reference:
+            self._pooled[:] = [reference, pooled_value(reference, self.cofs)]
+        value: Value | None = self._pooled[1]
+        return value
+
+    def corrected(self, cofs: Corrected | None) -> "Event":
+        """The event with the mean COF that the model in force corrects; unchanged if that corrects nothing."""
+        if cofs is None:
+            return self
+        means = {level: (mean, sd) for level, (mean, sd, _) in cofs.items()}
+        return replace(self, cofs=means, under={level: draws for level, (_, _, draws) in cofs.items() if draws})
+
+    def cofs_under(self, draw: int) -> ByPressure:
+        """Mean COF and its deviation by pressure [Pa] under one draw."""
+        if not self.under:
+            return self.cofs
+        return {level: (self.under[level][draw], sd) for level, (_, sd) in self.cofs.items()}
+
+    def at(self, cycles: float) -> "Event":
+        """The event at other cycles since new."""
+        return replace(self, cycles=cycles, duty=None if self.duty is None else replace(self.duty, end=cycles))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Series:
+    """One quantity at one pressure: measurements by progress ζ, and which event each came from.
+
+    `scale` leads from cycles since new to ζ and back; the course of the model in force is off the measurements. A slope is
+    one at `speed_rpm`, the lag of a loop one at `frequency_hz`. `draws` are the measurements under each draw of the model
+    in force, by weight, where it has any: the clutch is tracked under each, and `measurements` are their mean. `new_levels`
+    are the cycles since new of its tests that begin one without an event.
+    """
+
+    quantity: str
+    pressure: float
+    measurements: tuple[Measurement, ...]
+    events: tuple[int, ...]
+    scale: Scale
+    assumptions: Assumptions
+    speed_rpm: float | None = None
+    frequency_hz: float | None = None
+    draws: tuple[tuple[float, tuple[Measurement, ...]], ...] = ()
+    new_levels: tuple[float, ...] = ()
+
+    @property
+    def weighted(self) -> tuple[tuple[float, tuple[Measurement, ...]], ...]:
+        """The draws, or all of the weight on what was measured."""
+        return self.draws or ((1.0, self.measurements),)
+
+    def until(self, event: int) -> int:
+        """How many measurements there were when `event` had happened."""
+        return sum(1 for index in self.events if index <= event)
+
+    def priors(self, first: Measurement) -> Mapping[str, TrackPrior]:
+        """The priors that it is tracked under where `first` is its first measurement, by name."""
+        return self.assumptions.priors(self.quantity, first, self.scale)
+
+    def as_measured(self, index: int) -> tuple[float, Value]:
+        """Cycles since new, and value with deviation, of a measurement; the course of the model in force is put back on."""
+        measurement = self.measurements[index]
+        cycles = float(self.scale.cycles(measurement.progress))
+        added = float(self.assumptions.offset(self.quantity, self.pressure, np.array([cycles]))[0])
+        return cycles, (measurement.value + added, measurement.variance**0.5)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Life:
+    """One life of a clutch: its events by cycles, and the cycles at which it began. What follows from them is found once."""
+
+    origin: float
+    events: tuple[Event, ...]
+
+    @property
+    def name(self) -> str:
+        """The run_id of the rebuild that began it, "" where there was none."""
+        return self.events[0].run_id if self.events[0].rebuild else ""
+
+    @cached_property
+    def end(self) -> Event | None:
+        """The event by which it was declared ended; None while it goes on."""
+        return next((event for event in self.events if event.end is not None), None)
+
+    @cached_property
+    def speed_range(self) -> Value | None:
+        """The speed range of the first stationary test, over which mean COFs are taken."""
+        return next((event.speed_range for event in self.events if event.speed_range is not None), None)
+
+    @cached_property
+    def reference(self) -> ByPressure:
+        """Mean COF by pressure of the first stationary test that has one."""
+        return next((event.cofs for event in self.events if event.cofs), {})
+
+    @cached_property
+    def reference_oil(self) -> float | None:
+        """Mean oil temperature [K] of that test; None where it was not measured."""
+        return next((event.oil_temperature for event in self.events if event.cofs), None)
+
+    @cached_property
+    def tests(self) -> int:
+        """How many of its tests have a mean COF, those among them that cannot be compared with the first."""
+        return sum(bool(event.cofs) for event in self.events)
+
+    def in_other_oil(self, event: Event) -> bool:
+        """Whether a test was made at another oil temperature than the reference test: it cannot be compared with it."""
+        reference = self.reference_oil
+        if reference is None or event.oil_temperature is None:
+            return False
+        return abs(event.oil_temperature - reference) > OTHER_OIL
+
+    def _unexplained(self, tests: Sequence[Event]) -> Iterator[float]:
+        """The cycles of those tests that begin a new level while no event lies between them and the test before."""
+        shifts = [event.cycles for event in self.events if event.shift]
+        for at in (test.cycles for test in tests if test.new_level):
+            before = max((test.cycles for test in tests if test.cycles < at), default=0.0)
+            if not any(before <= shift <= at for shift in shifts):
+                yield at
+
+    def until(self, event: int) -> "Life":
+        """The life as it was when `event` had happened."""
+        return Life(origin=self.origin, events=self.events[: event + 1])
+
+    def with_cofs(self, cofs: Mapping[str, ByPressure]) -> "Life":
+        """The life by other mean COFs of its tests, by run_id; none for a test that is not among them."""
+        return replace(
+            self, events=tuple(replace(event, cofs=cofs.get(event.run_id, {}), under={}) for event in self.events)
+        )
+
+    def corrected(self, cofs: Mapping[str, Corrected]) -> "Life":
+        """The life with mean COFs as a model corrects them, by run_id; the others stay."""
+        return replace(self, events=tuple(event.corrected(cofs.get(event.run_id)) for event in self.events))
+
+    def scale(self, assumptions: Assumptions) -> Scale:
+        """ζ over cycles since new, by the duty of this life."""
+        return assumptions.scale(self.origin, [event.duty for event in self.events if event.duty is not None])
+
+    @cached_property
+    def _pooled(self) -> list[Series]:
+        """Where `pooled` keeps what it has found last."""
+        return []
+
+    def pooled(self, assumptions: Assumptions) -> Series:
+        """Mean COF over the pressures of the reference test."""
+        if not self._pooled or self._pooled[0].assumptions is not assumptions:
+            self._pooled[:] = [self._mean_cofs(assumptions, ALL_PRESSURES, pooled_value, Event.pooled)]
+        return self._pooled[0]
+
+    def at(self, assumptions: Assumptions, level: float) -> Series:
+        """Mean COF at one pressure level of the reference test."""
+        return self._mean_cofs(
+            assumptions, level, lambda _, cofs: nearest(level, cofs), lambda event, _: nearest(level, event.cofs)
+        )
+
+    def _mean_cofs(
+        self,
+        assumptions: Assumptions,
+        level: float,
+        value: Callable[[ByPressure, ByPressure], Value | None],
+        value_of: Callable[[Event, ByPressure], Value | None],
+    ) -> Series:
+        """Mean COF by its value of the reference test's and a test's mean COFs, under each draw of the model in force."""
+        first = next((event for event in self.events if event.cofs), None)
+        reference = {} if first is None else first.cofs
+        values = [value_of(event, reference) for event in self.events]
+        series = self.series(assumptions, MEAN_COF, level, values)
+        weights, course = assumptions.model.weights, assumptions.model.course
+        if first is None or len(weights) == 1 or (course is None and not any(event.under for event in self.events)):
+            return series
+        cycles = np.array([self.events[index].cycles for index in series.events])
+        off = assumptions.offsets(MEAN_COF, level, cycles)
+        draws = []
+        for draw, weight in enumerate(weights):
+            own_reference = first.cofs_under(draw)
+            cofs = [value(own_reference, self.events[index].cofs_under(draw)) for index in series.events]
+            offsets = off[min(draw, len(off) - 1)].tolist()
+            measurements = tuple(
+                replace(measured, value=cof[0] - added)
+                for measured, cof, added in zip(series.measurements, cofs, offsets, strict=True)
+                if cof is not None
+            )
+            draws.append((weight, measurements))
+        return replace(series, draws=tuple(draws))
+
+    def series(
+        self, assumptions: Assumptions, quantity: str, pressure: float, values: Sequence[Value | None]
+    ) -> Series:
+        """The series of a quantity from its value at every event, None where it has none.
+
+        Tests in oil of another temperature are no part of it, unless the model in force corrects for that.
+        """
+        corrected = assumptions.corrects_oil(quantity)
+        measured = [
+            (index, value)
+            for index, (event, value) in enumerate(zip(self.events, values, strict=True))
+            if value is not None and (corrected or not self.in_other_oil(event))
+        ]
+        scale = self.scale(assumptions)
+        cycles = np.array([self.events[index].cycles for index, _ in measured])
+        course = assumptions.offset(quantity, pressure, cycles)
+        epochs = list(itertools.accumulate(int(event.shift or event.new_level) for event in self.events))
+        levels = list(itertools.accumulate(int(event.new_level) for event in self.events))
+        places = zip(measured, scale.progress(cycles).tolist(), course.tolist(), strict=True)
+        return Series(
+            quantity=quantity,
+            pressure=pressure,
+            measurements=tuple(
+                self.events[index].measured(at, value - off, sd, epochs[index], levels[index])
+                if pressure == ALL_PRESSURES
+                else Measurement(
+                    progress=at, value=value - off, variance=sd**2, epoch=epochs[index], new_levels=levels[index]
+                )
+                for (index, (value, sd)), at, off in places
+            ),
+            events=tuple(index for index, _ in measured),
+            scale=scale,
+            assumptions=assumptions,
+            new_levels=tuple(self._unexplained([self.events[index] for index, _ in measured])),
+        )
+
+
+def order(events: Sequence[Event]) -> tuple[Event, ...]:
+    """Events sorted by cycles, and at equal cycles by when they were made: the order of arrival does not matter.
+
+    Where the rig did not say when, a run is no earlier than those that had arrived before it, whatever the clock said then.
+    """
+    arrived = sorted((event for event in events if not event.dated), key=lambda event: event.arrived)
+    moments = itertools.accumulate((event.moment for event in arrived), max)
+    places = {event.run_id: (moment, place) for place, (event, moment) in enumerate(zip(arrived, moments, strict=True))}
+    return tuple(
+        sorted(events, key=lambda event: (event.cycles, *places.get(event.run_id, (event.moment, 0)), event.run_id))
+    )
+
+
+def with_event(events: tuple[Event, ...], event: Event) -> tuple[Event, ...]:
+    """An ordered history with one more event, ordered."""
+    if not events or event.cycles > events[-1].cycles:  # behind all others, whatever is known of dates
+        return (*events, event)
+    return order([*events, event])
+
+
+def lives_of(events: Sequence[Event]) -> list[Life]:
+    """Cut an ordered history into lives at its rebuilds."""
+    starts = [index for index, event in enumerate(events) if event.rebuild and index > 0]
+    parts = [tuple(events[a:b]) for a, b in itertools.pairwise([0, *starts, len(events)]) if b > a]
+    return [Life(origin=part[0].cycles if part[0].rebuild else 0.0, events=part) for part in parts]
+
+
+def maintenance_fields(event: str | None, reason: str | None) -> dict[str, Any]:
+    """What maintenance of that kind is in the history; of a run that is none, nothing."""
+    return {
+        "rebuild": event == REBUILD,
+        "shift": event not in (None, REBUILD, END_OF_LIFE),
+        "end": reason if event == END_OF_LIFE else None,
+    }
+
+
+def require_within_ends(events: Sequence[Event]) -> None:
+    """Raise LifeEndedError where a life of an ordered history has duty or tests after its declared end, or two ends."""
+    beyond = beyond_end(events)
+    if beyond is not None:
+        end, event = beyond
+        later = "a second end" if event.end else f"{event.kind} {event.run_id!r}"
+        raise LifeEndedError(
+            f"{later} at {event.cycles:g} cycles is after the declared end at {end.cycles:g} cycles (run {end.run_id!r}): "
+            f"declare the end at {event.cycles:g} cycles or later, post a rebuild, correct the cycles, or withdraw the end"
+        )
+
+
+def beyond_end(events: Sequence[Event]) -> tuple[Event, Event] | None:
+    """A declared end of an ordered history, and duty or a test after it in its life, or a second end; None without any."""
+    for life in lives_of(events):
+        end = life.end
+        if end is None:
+            continue
+        for event in life.events:
+            second = event.end is not None and event is not end
+            if second or (event.kind != MAINTENANCE and event.cycles > end.cycles):
+                return end, event
+    return None
+
+
+def life_with(events: Sequence[Event], event: Event) -> Life:
+    """The life of an ordered history to which one of its events belongs, whatever became of it since."""
+    return next(life for life in lives_of(events) if any(member.run_id == event.run_id for member in life.events))
+
+
+def stationary_tests_of(events: Sequence[Event]) -> dict[str, str | None]:
+    """run_id of every dynamic test -> that of the stationary test that shows the clutch's state at it: the last one of its
+    life up to its cycles, else the next; None where there is none."""
+    names: dict[str, str | None] = {}
+    for life in lives_of(events):
+        tests = [event for event in life.events if event.speed_range is not None]
+        cycles = [test.cycles for test in tests]
+        for event in life.events:
+            if event.kind == DYNAMIC:
+                place = max(0, bisect.bisect_right(cycles, event.cycles) - 1)
+                names[event.run_id] = tests[place].run_id if tests else None
+    return names
+
+
+def latest_before(events: Sequence[Event]) -> dict[str, float]:
+    """run_id -> the most cycles of all runs that had arrived before it, 0 for the first."""
+    latest, most = {}, 0.0
+    for event in sorted(events, key=lambda event: event.arrived):
+        latest[event.run_id] = most
+        most = max(most, event.cycles)
+    return latest
+
+
+def reference_velocities(speed_range: Value, geometry: Geometry) -> FloatArray:
+    """The protocol's velocities [40] m/s for a test with that range of speeds [rad/s]."""
+    return geometry.sliding_velocity(protocol_speeds(*speed_range))
+
+
+def nearest(level: float, values: ByPressure) -> Value | None:
+    """The value at the pressure that is the same level as `level`, if there is one."""
+    if level in values or not values:
+        return values.get(level)
+    near = min(values, key=lambda pressure: abs(pressure - level))
+    return values[near] if abs(near - level) <= max(LEVEL_GAP, LEVEL_GAP_SHARE * level) else None
+
+
+def nearest_pressure(level: float, pressures: Sequence[float]) -> float | None:
+    """The pressure [Pa] that is the same level as `level`, if there is one."""
+    near = nearest(level, {pressure: (pressure, 0.0) for pressure in pressures})
+    return None if near is None else near[0]
+
+
+def duty_block(
+    end: float, cycles: float | None, energy_kj: float | None, speed_rpm: float | None, duration_s: float | None
+) -> Block | None:
+    """A block of duty in SI units, None where a run is none."""
+    if cycles is None:
+        return None
+    return Block(
+        end=end,
+        cycles=cycles,
+        energy=None if energy_kj is None else 1000.0 * energy_kj,
+        speed=None if speed_rpm is None else speed_rpm * RADIANS_PER_SECOND_PER_RPM,
+        duration=duration_s,
+    )
+
+
+def moment_of(started_at: str | None, received_at: str) -> float:
+    """When a run was made [s since 1970]: when it was started, or received where the rig did not say."""
+    return datetime.fromisoformat(started_at or received_at).timestamp()
+
+
+def pace_of(events: Sequence[Event]) -> float | None:
+    """Cycles a second between the first and the last dated run of a life, idle hours included; None where none is known."""
+    dated = [event for event in events if event.dated]
+    if len(dated) < 2:
+        return None
+    seconds, cycles = dated[-1].moment - dated[0].moment, dated[-1].cycles - dated[0].cycles
+    return cycles / seconds if seconds > 0.0 and cycles > 0.0 else None
+
+
+def moment_at(events: Sequence[Event], pace: float, cycles: float) -> float:
+    """When [s since 1970] so many cycles since new will have been run at a pace [1/s], from the newest dated run of a life
+    on, or from its newest where none is dated. There is at least one run."""
+    start = next((event for event in reversed(events) if event.dated), events[-1])
+    return start.moment + (cycles - start.cycles) / pace
+
+
+def date_of(moment: float) -> str | None:
+    """A moment [s since 1970] as text, UTC, ISO 8601; None outside of the years 1 to 9999."""
+    earliest, latest = _MOMENTS
+    return datetime.fromtimestamp(moment, UTC).isoformat(timespec="seconds") if earliest < moment < latest else None
+
+
+def pooled_value(reference: ByPressure, values: ByPressure) -> Value | None:
+    """Mean over the reference pressures; for a pressure that is missing the rest stands, scaled as in the reference."""
+    if values.keys() == reference.keys():
+        matched, scale = values, 1.0
+    else:
+        matched = {level: value for level in reference if (value := nearest(level, values)) is not None}
+        scale = _mean(reference, reference) / _mean(reference, matched) if matched else 1.0
+    if not matched:
+        return None
+    means, deviations = zip(*matched.values(), strict=True)
+    return math.fsum(means) / len(means) * scale, math.hypot(*deviations) / len(means) * scale
+
+
+def _mean(values: ByPressure, levels: ByPressure) -> float:
+    return math.fsum(values[level][0] for level in levels) / len(levels)

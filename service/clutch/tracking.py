@@ -1,0 +1,370 @@
+"""Tracks a life: runs the three filters over a series, and predicts after every event and whenever it is asked.
+
+A run that comes last in order of cycles carries the stored filter states one step on; any other run makes the life be
+tracked again from its first test. Both ways give the same answer: the random numbers of a step depend on series and step
+alone. Where a fleet's prior stands beside the weak one a filter runs under both, and its draws are put together by their
+evidence (`models.prognosis.fleet`).
+"""
+
+import zlib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from models.arrays import FloatArray
+from models.prognosis.back_cast import BackCast, kept_after
+from models.prognosis.course_shares import course_shares
+from models.prognosis.criteria import FEWEST_TESTS
+from models.prognosis.first_passage import Offset, horizon_at, predict_first_passage
+from models.prognosis.stated_end import StatedEnd, stated_end
+from models.tracking.filters.grid import Grid, GridState
+from models.tracking.filters.particle import Particle, ParticleState
+from models.tracking.filters.ukf import Ukf, UkfState
+from models.tracking.measurement import Measurement
+from models.tracking.posterior import Tracker, TrackPosterior, mixture
+from models.tracking.prior import TrackPrior
+from service.channels import PASCALS_PER_BAR, bar, whole
+from service.clutch import items, notices
+from service.clutch.assumptions import ALL_PRESSURES, WEAK, Assumptions
+from service.clutch.criteria import FEWEST_PARTICLES, PREDICTION_DRAWS
+from service.clutch.timeline import Event, Life, Series, lives_of, nearest_pressure
+from service.errors import NotFoundError, Notice
+
+FilterState = ParticleState | UkfState | GridState
+
+_GRID = Grid()
+_TRACKERS: Mapping[str, Tracker[Any]] = {tracker.name: tracker for tracker in (Particle(), Ukf(), _GRID)}
+METHODS = tuple(_TRACKERS)
+#: The exact filter is laid again over the whole history at each step, and computed when it is asked for: these carry a
+#: state from run to run, and their predictions are stored with each.
+CARRIED = tuple(method for method in METHODS if method != _GRID.name)
+
+_STATES: Mapping[str, type[FilterState]] = {"particle": ParticleState, "ukf": UkfState}
+#: What the arrays of a back-cast are named after, among the names of priors.
+_BACK_CAST = "back_cast"
+#: What of a state are flags; numbers that happen to be 0 and 1 are stored like them.
+_FLAGS = "outlying"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrackPrediction:
+    """The prediction at `cycles` by one method, in the public shape."""
+
+    cycles: float
+    method: str
+    payload: dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tracked:
+    """A filter's states after `runs` measurements of a series, by the name of the prior that they started from; what its
+    forecasts along the way said about the tests since; and the sample that was drawn of them, if one was: it is not stored.
+    """
+
+    runs: int
+    states: Mapping[str, FilterState]
+    back_cast: BackCast
+    sample: TrackPosterior | None = None
+
+    def to_arrays(self) -> dict[str, FloatArray | NDArray[np.bool_]]:
+        """Named arrays: those of a state after the prior that it started from, as in `weak/mean`."""
+        named = {
+            f"{prior}/{name}": array
+            for prior, state in self.states.items()
+            for name, array in state.to_arrays().items()
+        }
+        back_cast = {"forecasts": self.back_cast.forecasts, "misses": self.back_cast.misses}
+        return named | {f"{_BACK_CAST}/{name}": array for name, array in back_cast.items()}
+
+    @classmethod
+    def from_arrays(cls, method: str, runs: int, arrays: Mapping[str, FloatArray | NDArray[np.bool_]]) -> "Tracked":
+        parts: dict[str, dict[str, Any]] = {}
+        for name, array in arrays.items():
+            owner, _, part = name.partition("/")
+            is_number = array.dtype == np.float64 or part == _FLAGS
+            parts.setdefault(owner, {})[part] = array if is_number else array.astype(np.float64)
+        back_cast = BackCast(**parts.pop(_BACK_CAST))
+        states = {prior: _STATES[method].from_arrays(arrays_of_prior) for prior, arrays_of_prior in parts.items()}
+        return cls(runs=runs, states=states, back_cast=back_cast)
+
+
+States = Mapping[str, Tracked]
+
+
+def follow(
+    life: Life, whole_series: Series, fraction: float, states: States, *, first_event: int = 0
+) -> Iterator[tuple[States, list[TrackPrediction]]]:
+    """Walk a life's events from `first_event` on; after each, the states by method and the predictions of the series.
+
+    `whole_series` is that of all its events, `states` are those before `first_event`. A life with too few tests yields
+    `insufficient_data`.
+    """
+    for index in range(first_event, len(life.events)):
+        so_far, cycles = life.until(index), life.events[index].cycles
+        series = whole_series
+        if not series.assumptions.counts_cycles:
+            series = so_far.pooled(series.assumptions)
+        runs, tests = series.until(index), so_far.tests
+        if runs:
+            states = {method: advance(method, series, states.get(method), runs) for method in CARRIED}
+        predictions = []
+        for method in CARRIED:
+            payload = predict(method, series, states.get(method), cycles, fraction, tests=tests)
+            predictions.append(TrackPrediction(cycles=cycles, method=method, payload=items.ended(payload, so_far.end)))
+        yield states, predictions
+
+
+def advance(
+    method: str, series: Series, tracked: Tracked | None, runs: int, *, back_cast: BackCast | None = None
+) -> Tracked:
+    """Carry one filter on until it has taken in the first `runs` measurements of the series.
+
+    A `back_cast` that is known from another filter takes the place of its own. States that were made of other measurements
+    or under other priors are not carried on: then the filter starts again.
+    """
+    branches = _branches(series)
+    if tracked is not None and not _continues(tracked, branches):
+        tracked = None
+    if tracked is not None and tracked.runs == runs:
+        return tracked
+    tracker = _tracker(method, len(branches))
+    weak_prior = series.priors(series.measurements[0])[WEAK]
+    if tracked is None:
+        start = {name: tracker.start(prior) for name, (prior, _) in branches.items()}
+        tracked = Tracked(runs=0, states=start, back_cast=BackCast.nothing())
+    for step in range(tracked.runs, runs):
+        measurement = series.measurements[step]
+        states = {
+            name: tracker.update(state, branches[name][1][step], step_rng(_purpose(method, name), series, step))
+            for name, state in tracked.states.items()
+        }
+        judged = tracked.back_cast.judged(measurement) if back_cast is None else back_cast
+        tracked = Tracked(runs=step + 1, states=states, back_cast=judged)
+        if back_cast is None and kept_after(step + 1):
+            sample = drawn(method, series, tracked)
+            forecast = tracked.back_cast.forecast(sample, measurement, weak_prior)
+            tracked = replace(tracked, back_cast=forecast, sample=sample)
+    return tracked
+
+
+def _branches(series: Series) -> dict[str, tuple[TrackPrior, tuple[Measurement, ...]]]:
+    """What a filter is run under, by name: every prior, with every draw of the series' measurements."""
+    return {
+        _branch(prior_name, draw, series): (prior, measurements)
+        for draw, (_, measurements) in enumerate(series.weighted)
+        for prior_name, prior in series.priors(measurements[0]).items()
+    }
+
+
+def _branch(prior: str, draw: int, series: Series) -> str:
+    """The name of a state: that of its prior, and of the draw where there are several."""
+    return f"{prior}@{draw}" if series.draws else prior
+
+
+def _tracker(method: str, branches: int) -> Tracker[Any]:
+    """A filter in one of so many branches, among which the particles are shared."""
+    tracker = _TRACKERS[method]
+    if not isinstance(tracker, Particle):
+        return tracker
+    return replace(tracker, particles=max(tracker.particles // branches, min(tracker.particles, FEWEST_PARTICLES)))
+
+
+def _continues(tracked: Tracked, branches: Mapping[str, tuple[TrackPrior, tuple[Measurement, ...]]]) -> bool:
+    """Whether the states are those of the branches' first measurements under their priors."""
+    if tracked.states.keys() != branches.keys():
+        return False
+    for name, state in tracked.states.items():
+        prior, branch_state = branches[name]
+        if state.prior != prior or tracked.runs > len(branch_state):
+            return False
+        measurements, history = branch_state[: tracked.runs], state.history
+        for name in ("progress", "value", "epoch"):
+            if [getattr(m, name) for m in measurements] != getattr(history, name)[: len(measurements)].tolist():
+                return False
+    return True
+
+
+def drawn(method: str, series: Series, tracked: Tracked) -> TrackPosterior:
+    """A weighted sample of the coefficients after `tracked.runs` measurements; the same each time, and drawn once.
+
+    Its size is shared among the priors and the draws of the model in force: so a prediction costs about the same.
+    """
+    if tracked.sample is not None:
+        return tracked.sample
+    tracker, size = _tracker(method, len(tracked.states)), PREDICTION_DRAWS // len(tracked.states)
+    parts = []
+    for draw, (weight, measurements) in enumerate(series.weighted):
+        posteriors = {}
+        for prior in series.priors(measurements[0]):
+            name = _branch(prior, draw, series)
+            rng = step_rng(f"{_purpose(method, name)}-posterior", series, tracked.runs)
+            posteriors[prior] = tracker.posterior(tracked.states[name], size, rng)
+        parts.append((weight, series.assumptions.pooled(posteriors, measurements[0], series.scale)))
+    return mixture(parts) if series.draws else parts[0][1]
+
+
+def _purpose(method: str, prior: str) -> str:
+    return method if prior == WEAK else f"{method}-{prior}"
+
+
+def step_rng(purpose: str, series: Series, step: int) -> np.random.Generator:
+    """The random numbers of one step: they depend on purpose, series and step alone, not on the clutch's name."""
+    name = f"{purpose}/{series.quantity}/{series.pressure!r}"
+    return np.random.default_rng([zlib.crc32(name.encode()), step])
+
+
+def predict(
+    method: str, series: Series, tracked: Tracked | None, cycles: float, fraction: float, *, tests: int
+) -> dict[str, Any]:
+    """The prediction at `cycles` of a series, in the public shape; the life has so many `tests`.
+
+    With too few of them only the last and the safe bound are stated.
+    """
+    answer = items.insufficient(series.assumptions, cycles, series.pressure, fraction)
+    if tracked is None:
+        return answer
+    runs, scale = tracked.runs, series.scale
+    sample = drawn(method, series, tracked)
+    horizon_cycles = horizon_at(cycles - scale.origin)
+    horizon = float(scale.progress(scale.origin + horizon_cycles))
+    end = end_of_life(sample, series, tracked, cycles, fraction, horizon)
+    passage = predict_first_passage(
+        sample,
+        fraction=fraction,
+        as_of=float(scale.progress(cycles)),
+        horizon=horizon,
+        offset=offset_of(series),
+        stated=(end.ends, end.weight),
+        initial=None if end.late is None else end.late.initial,
+    )
+    ends = {q: None if zeta is None else float(scale.cycles(zeta)) for q, zeta in passage.end_of_life.items()}
+    measured_at, (value, sd) = series.as_measured(runs - 1)
+    measured = {"mean_cof": value, "mean_cof_sd": sd, "measured_at_cycles": whole(round(measured_at, 3))}
+    warnings = [
+        *notices.left_out(tests, runs),
+        *notices.new_level([at for at in series.new_levels if at <= cycles]),
+        *_off_track(sample, series, runs),
+    ]
+    answer |= {
+        "runs_used": runs,
+        "current": answer["current"] | measured,
+        "horizon_cycles": whole(horizon_cycles),
+        "at_least": items.safe_bound(ends[items.SAFE], cycles, scale.origin),
+        "warnings": items.notice_items(warnings),
+    }
+    if len({measurement.progress for measurement in series.measurements[:runs]}) < FEWEST_TESTS:
+        return answer  # what else the prior makes of the tests is no finding
+    courses, back_cast = course_shares(sample), tracked.back_cast
+    warnings += [
+        *notices.not_eq_6(courses),
+        *notices.new_extrapolated(series, end.late, fraction),
+        *notices.missed(back_cast),
+    ]
+    course, *alternatives = (
+        {"name": share.name.value, "probability": share.probability, "order": share.order} for share in courses
+    )
+    mean, deviation = passage.current
+    left = mean / passage.initial if passage.initial > 0 else None
+    health = None if left is None else items.share_of_way(left, 1.0, fraction)
+    now = {"mean_cof": mean, "mean_cof_sd": deviation, "fraction_of_initial": left, "health": health}
+    return answer | {
+        "status": passage.status.value,
+        "criterion": items.criterion_item(fraction, series.pressure, passage.initial, passage.threshold),
+        "current": answer["current"] | now,
+        "remaining_cycles": items.by_quantile(
+            {q: None if at is None else max(0.0, at - cycles) for q, at in ends.items()}
+        ),
+        "end_of_life_cycles": items.by_quantile(ends),
+        "probability_of_reaching": passage.probability_of_reaching,
+        "back_cast": {"held": back_cast.held, "of": back_cast.misses.size, "widening": back_cast.widening},
+        "ended_lives": end.lives,
+        "sample": {"effective_draws": sample.effective_draws, "status": sample.status.value},
+        "course": {**course, "alternatives": alternatives},
+        "warnings": items.notice_items(warnings),
+    }
+
+
+def _off_track(sample: TrackPosterior, series: Series, runs: int) -> list[Notice]:
+    """The warning of a last test that lies far off under every draw of the model in force, by the first of them."""
+    first: list[Notice] = []
+    for draw, (_, measurements) in enumerate(series.weighted):
+        prior = series.priors(measurements[0])[WEAK]
+        warnings = notices.off_track(sample.of_branch(draw), measurements[:runs], prior)
+        if not warnings:
+            return []
+        first = first or warnings
+    return first
+
+
+def end_of_life(
+    sample: TrackPosterior, series: Series, tracked: Tracked, cycles: float, fraction: float, horizon: float
+) -> StatedEnd:
+    """The end of life ζ as it is stated at `cycles`, up to a horizon in ζ."""
+    as_of = float(series.scale.progress(cycles))
+    return stated_end(
+        sample,
+        fraction=fraction,
+        as_of=as_of,
+        horizon=max(horizon, as_of),
+        offset=offset_of(series),
+        power=tracked.back_cast.widening,
+        ended=series.assumptions.ended((series.quantity, series.pressure), fraction, series.scale),
+        tests=series.measurements[: tracked.runs],
+    )
+
+
+def offset_of(series: Series) -> Offset | None:
+    """The course of the model in force over ζ, None where there is none."""
+    if series.assumptions.model.course is None:
+        return None
+    return lambda progress: series.assumptions.offsets(series.quantity, series.pressure, series.scale.cycles(progress))
+
+
+def mean_offset_of(series: Series) -> Offset | None:
+    """The mean of that over the model's draws [1, k]."""
+    quantity, pressure, assumptions = series.quantity, series.pressure, series.assumptions
+    if assumptions.model.course is None:
+        return None
+    return lambda progress: assumptions.offset(quantity, pressure, series.scale.cycles(progress))[None]
+
+
+def predict_at(
+    events: Sequence[Event],
+    assumptions: Assumptions,
+    fraction: float,
+    *,
+    method: str,
+    pressure_bar: float | None = None,
+    at_cycles: float | None = None,
+    back_cast: BackCast | None = None,
+    carried: Tracked | None = None,
+) -> dict[str, Any]:
+    """The prediction at one pressure of the reference test, or over all, as it would have been made at `at_cycles`.
+
+    A `back_cast` that is known is not made again: of the exact filter it takes most of the time. A filter that was `carried`
+    through the first measurements goes on. Raises NotFoundError where the reference test did not measure that pressure.
+    """
+    lives = lives_of(events)
+    level = ALL_PRESSURES if pressure_bar is None else _level(lives[-1] if lives else None, pressure_bar)
+    happened = [event for event in events if at_cycles is None or event.cycles <= at_cycles]
+    if not happened:
+        return items.insufficient(assumptions, None, level, fraction)
+    life = lives_of(happened)[-1]
+    cycles = happened[-1].cycles
+    series = life.pooled(assumptions) if pressure_bar is None else life.at(assumptions, level)
+    if not series.measurements:
+        return items.ended(items.insufficient(assumptions, cycles, level, fraction), life.end)
+    tracked = advance(method, series, carried, len(series.measurements), back_cast=back_cast)
+    return items.ended(predict(method, series, tracked, cycles, fraction, tests=life.tests), life.end)
+
+
+def _level(life: Life | None, pressure_bar: float) -> float:
+    levels = [] if life is None else sorted(life.reference)
+    level = nearest_pressure(pressure_bar * PASCALS_PER_BAR, levels)
+    if level is None:
+        measured = ", ".join(f"{bar(level):g}" for level in levels) or "none"
+        raise NotFoundError(f"no track at {pressure_bar:g} bar; the pressures of the first stationary test: {measured}")
+    return level

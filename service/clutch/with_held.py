@@ -1,0 +1,129 @@
+"""The remaining life of a clutch without its held runs, and with them.
+
+Computed with the results of every run and change, and stored with them as the clutch's summary.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from service.clutch.condition import SHOWN, STORED, recent
+from service.clutch.engagements import StoredEngagement, engagements_over_life
+from service.clutch.items import ended
+from service.clutch.model_correction import RunReader
+from service.clutch.quantities.ends import CriterionEnd, criteria_answer, criterion_end
+from service.clutch.quantities.measured import ChosenLife, MeasuredLife, chosen_life
+from service.clutch.recomputation import ClutchHistory, Levels, Receipt, Tracking, with_cofs
+from service.clutch.timeline import Event, lives_of, moment_at, order, pace_of
+from service.clutch.tracking import CARRIED, States, predict_at
+from service.errors import NotFoundError
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ClutchMeasurements:
+    """What was measured of a clutch by run_id, of its held runs too."""
+
+    levels: Levels
+    receipts: Mapping[str, Receipt]
+    engagements: Mapping[str, StoredEngagement]
+    reader: RunReader | None = None
+
+
+def needs_evidence(state: ClutchHistory) -> bool:
+    """Whether a clutch's summary follows from more than its tracks."""
+    return bool(state.held or state.record.end_of_life.criteria)
+
+
+def summarised(state: ClutchHistory, tracking: Tracking, evidence: ClutchMeasurements | None) -> dict[str, Any]:
+    """The summary of a clutch that was tracked; `evidence` is needed where `needs_evidence` says so."""
+    if not state.events:
+        return held_summary(state, {}, evidence)
+    last, life = state.events[-1].cycles, state.lives[-1]
+    payload = next(
+        prediction.payload
+        for prediction in tracking.predictions
+        if (prediction.cycles, prediction.method) == (last, SHOWN)
+    )
+    if evidence is not None:
+        payload = payload | by_own_criteria(state, SHOWN, payload, evidence, tracking.filters)
+    pace, pooled = pace_of(life.events), life.pooled(state.assumptions())
+    summary = {name: payload[name] for name in STORED} | {
+        "runs": len(state.events),
+        "new_levels": [event.run_id for event in state.events if event.new_level],
+        "recent": recent(state.events, pooled),
+        "life": life.name,
+        "from_cycles": life.origin,
+        "tests": life.tests,
+        "places": len({measurement.progress for measurement in pooled.measurements}),
+        "pace": None if pace is None else {"cycles_per_second": pace, "moment": moment_at(life.events, pace, last)},
+    }
+    return summary | held_summary(state, tracking.filters, evidence)
+
+
+def held_summary(state: ClutchHistory, filters: States, evidence: ClutchMeasurements | None) -> dict[str, Any]:
+    """What a summary says of the held runs: how many there are, and by each filter what would be predicted with them."""
+    if not state.held or evidence is None:
+        return {"held": len(state.held), "with_held": None}
+    state_with_held = with_held(state, evidence)
+    return {
+        "held": len(state.held),
+        "with_held": {method: outlook(state_with_held, method, evidence, filters) for method in CARRIED},
+    }
+
+
+def with_held(state: ClutchHistory, evidence: ClutchMeasurements) -> ClutchHistory:
+    """The clutch as it would be were its held runs accepted."""
+    state_with_held = replace(state, events=order([*state.events, *state.held]), held=())
+    if evidence.reader is None:
+        raise ValueError("a history with held runs needs a reader of them")
+    return with_cofs(state_with_held, evidence.levels, evidence.reader)[0]
+
+
+def outlook(state: ClutchHistory, method: str, evidence: ClutchMeasurements, filters: States) -> dict[str, Any]:
+    """The remaining life by a filter and the clutch's own criteria; `filters` of other measurements are not carried on."""
+    payload = predict_at(state.events, state.assumptions(), state.fraction, method=method, carried=filters.get(method))
+    payload |= by_own_criteria(state, method, payload, evidence, filters)
+    return {name: payload[name] for name in ("status", "as_of_cycles", "remaining_cycles", "at_least")}
+
+
+def by_own_criteria(
+    state: ClutchHistory, method: str, payload: Mapping[str, Any], evidence: ClutchMeasurements, filters: States
+) -> dict[str, Any]:
+    """The fields of a prediction that the criteria of the record change; empty if only mean COF ends its life."""
+    criteria = state.record.end_of_life.criteria
+    measured = measured_life(state, chosen_life(state), evidence, filters) if criteria else None
+    if measured is None:
+        return {}
+    ends = []
+    for criterion in criteria:
+        try:
+            ends.append(criterion_end(measured, criterion, method))
+        except NotFoundError:  # measured, but not at the criterion's place: who asks for the remaining life is told so
+            ends.append(CriterionEnd(criterion=criterion, tests=0))
+    by_criteria = criteria_answer(measured, ends, payload["current"])
+    return ended({"current": payload["current"], **by_criteria}, measured.life.end)
+
+
+def measured_life(
+    state: ClutchHistory, chosen: ChosenLife, evidence: ClutchMeasurements, filters: States | None = None
+) -> MeasuredLife | None:
+    """A life of a clutch with all that was measured in it, None where nothing was yet."""
+    if chosen.life is None:
+        return None
+    return MeasuredLife(
+        life=chosen.life,
+        assumptions=chosen.assumptions,
+        geometry=state.geometry,
+        fraction=state.fraction,
+        levels=evidence.levels,
+        receipts=evidence.receipts,
+        engagements=engagement_rows(state.events, evidence.engagements),
+        filters=filters or {},
+    )
+
+
+def engagement_rows(events: Sequence[Event], engagements: Mapping[str, StoredEngagement]) -> list[dict[str, Any]]:
+    """The engagements of a history with all indicators, by life and cycles."""
+    names = [[event.run_id for event in life.events] for life in lives_of(events)]
+    stored = [engagements[event.run_id] for event in events if event.run_id in engagements]
+    return engagements_over_life(stored, names) if stored else []

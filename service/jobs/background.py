@@ -1,0 +1,57 @@
+"""Work that waits for all other: diagnoses, answers made again, clutches tracked again under another fleet prior, replays.
+
+python -m service.jobs.background MODULE ...    runs a module so, what it imports and all
+"""
+
+import multiprocessing
+import os
+import runpy
+import sys
+import threading
+from collections.abc import Callable
+
+from threadpoolctl import threadpool_limits
+
+#: What libraries of linear algebra read when they are loaded.
+_THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+
+
+def use_one_blas_thread() -> None:
+    """Have linear algebra in this process use no threads of its own, whether its libraries are loaded or are to be."""
+    os.environ.update(dict.fromkeys(_THREADS, "1"))
+    threadpool_limits(limits=1, user_api="blas")
+
+
+def yield_to_others() -> None:
+    """Have the calling thread, or process before it starts threads, run where the processors have nothing else to do.
+
+    On Linux by the policy SCHED_IDLE: what wakes takes such a processor as idle, and need not wait for the next balancing
+    as it does beside a thread of the lowest priority (`nice` 19), which is what other systems give, and those that refuse
+    the policy. The threads in which libraries of linear algebra help do not yield: in this process they no longer do.
+    """
+    use_one_blas_thread()
+    if hasattr(os, "SCHED_IDLE"):
+        try:
+            os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
+        except OSError:  # as in a container whose filter of system calls is strict
+            os.nice(19)
+    else:
+        os.nice(19)
+
+
+def end_with_parent(end: Callable[[], object] = lambda: os._exit(3)) -> None:
+    """Have this process end when the one that started it has, however that ended."""
+    parent = multiprocessing.parent_process()
+
+    def await_it() -> None:
+        if parent is not None:
+            parent.join()
+            end()
+
+    threading.Thread(target=await_it, daemon=True).start()
+
+
+if __name__ == "__main__":
+    yield_to_others()
+    sys.argv = sys.argv[1:]
+    runpy.run_module(sys.argv[0], run_name="__main__", alter_sys=True)

@@ -1,0 +1,108 @@
+"""A worker process: it opens the database once and calls what it is sent, one call after the other."""
+
+import gc
+import importlib
+import os
+import pickle
+import signal
+import threading
+import time
+import traceback
+from collections.abc import Callable
+from contextlib import suppress
+from multiprocessing.connection import Connection
+from typing import Any
+
+from service import logging
+from service.jobs.background import end_with_parent, use_one_blas_thread, yield_to_others
+from storage.engine.database import Database
+from storage.engine.opening import open_database
+
+#: What nearly every call needs, loaded before the first comes.
+LOADED_EARLY = (
+    "filterpy.kalman",
+    "scipy.ndimage",
+    "service.changes.ingest_run",
+    "service.answers.cache",
+    "service.runs.json_run",
+    "service.runs.upload",
+)
+
+#: Seconds after a SIGTERM until which a worker works on. Chosen: longer than the service waits for requests when it stops.
+_LAST_SECONDS = 15.0
+
+#: [s] Between two signs of life. Chosen: a tenth of the silence after which a process is ended.
+_BEAT = 1.0
+
+
+def begin(database_url: str, nice: int | None, log: tuple[logging.LogFormat, logging.LogLevel]) -> Database:
+    """Prepare this process, and open its database. It logs so; it yields by `nice` or, where that is None, to all others; it
+    ends with the service, and leaves it to the service to stop: what stops all processes at once must not take a run from
+    it that is being stored."""
+    logging.configure(*log)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, _end_later)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})
+    end_with_parent()
+    if nice is None:
+        yield_to_others()
+    else:
+        os.nice(nice)
+    use_one_blas_thread()
+    for name in LOADED_EARLY:
+        importlib.import_module(name)
+    gc.freeze()  # what is loaded stays: the collector need not walk through it
+    return open_database(database_url)
+
+
+def main(
+    line: Connection, database_url: str, nice: int | None, log: tuple[logging.LogFormat, logging.LogLevel]
+) -> None:
+    """Make the calls that come over the line and answer with what each returns or raises, until its other end is closed.
+
+    Each second, and once it is ready, it says that it is there, whatever it does.
+    """
+    sending = threading.Lock()
+
+    def send(message: Any) -> None:
+        with sending:
+            line.send(message)
+
+    threading.Thread(target=_beat, args=(send,), daemon=True).start()
+    database = begin(database_url, nice, log)
+    with suppress(EOFError, OSError):  # the service has closed the line, or has ended
+        send(())
+        while True:
+            answer = _answered(database, line.recv_bytes())
+            try:
+                send(answer)
+            except (TypeError, AttributeError, ValueError, pickle.PicklingError) as error:
+                send((None, RuntimeError(f"the result cannot be sent: {error}")))
+
+
+def _answered(database: Database, message: bytes) -> tuple[Any, BaseException | None]:
+    """What a call returns, or raises with where it was raised."""
+    try:
+        function, arguments, request = pickle.loads(message)  # noqa: S301  (of our own service)
+        logging.request_id.set(request)
+        return function(database, *arguments), None
+    except BaseException as error:  # noqa: BLE001  (raised again for who asked)
+        error.add_note("".join(traceback.format_exception(error)))
+        return None, error
+
+
+def _beat(send: Callable[[None], None]) -> None:
+    with suppress(OSError):
+        while True:
+            time.sleep(_BEAT)
+            send(None)
+
+
+def load(_: Database) -> None:
+    """Nothing: what nearly every call needs is loaded when a process begins."""
+
+
+def _end_later(*_: object) -> None:
+    last = threading.Timer(_LAST_SECONDS, os._exit, (3,))
+    last.daemon = True
+    last.start()

@@ -1,5 +1,0 @@
-"""One file an answer; none changes what is stored.
-
-In: the database, a clutch's name and the arguments of a request. Out: dictionaries and lists in the shapes of `schemas/`.
-Open `remaining_life.py` first; `cache.py` keeps computed answers as bytes.
-"""

@@ -1,0 +1,424 @@
+"""A table as read -> a run's channels: columns chosen, units converted, all on one clock, invalid samples left out.
+
+What was left out or resampled is in the notices. Each column has its own time: the time column before it in its group, else
+its recorder's clock, else the one time column of the table.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import zip_longest
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from models.arrays import FloatArray
+from models.records.cleaning import stands
+from service.channels import check_columns
+from service.errors import MAX_QUOTED, InvalidError, Notice, TooLargeError
+from service.readers.column_names import (
+    Taken,
+    choices_of,
+    choose,
+    is_counter,
+    known_channel,
+    no_unit,
+    part_of_second,
+    several_times,
+)
+from service.readers.limits import Limits
+from service.readers.long_table import says_valid, valid_rows, widened
+from service.readers.missing_values import drop_totals, mask_stated_marks, refuse_stand_ins
+from service.readers.numerals import empty_cells, plain, read_cells
+from service.readers.table import NO_MISSING, NO_TIME, Clock, FileColumn, Reading, Table, index_of_wanted, labels, marks
+
+#: The code of the notice that lists unused columns.
+LEFT_OUT = "columns_left_out"
+_SECOND = np.timedelta64(1, "s")
+#: The channel on whose clock the others are brought, the first that is there.
+_LEADING = ("torque_nm", "speed_rpm", "pressure_bar")
+#: Steps of the time that repeated titles may interrupt a table for. Chosen: a printed page takes none, a new test minutes.
+_LONGEST_PAUSE = 10
+#: A second, in days; as a step in seconds, less than rigs sample at.
+_SECOND_OF_DAY = 1.2e-5
+#: Seconds since 1970 of 2000 and 2100. In nanoseconds, .NET's ticks of that time would be of 1990.
+_OUR_TIME = np.array([9.46e8, 4.1e9])
+#: What computers count since when: Unix, Windows' file times, .NET's ticks.
+_COUNTED = {"ms since 1970": 1e3, "µs since 1970": 1e6, "ns since 1970": 1e9}
+_COUNTED |= {"100 ns since 1601": 1e7, "100 ns since 0001": 1e7}
+#: Empty cells that show a channel of a lower rate. Chosen: fewer may have been left empty by hand.
+_MIN_GAPS = 4
+#: The share of a clock's steps that go on. Chosen: times that are rounded to half a step stand still at every second.
+_MOST_OF = 0.9
+#: Columns that one notice names.
+_MAX_NAMED = 20
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Channels:
+    """Channels [n] by public name in their units. `counts`: the time may be a recorder's default that counts samples;
+    `labels`: words above the table -> what stands beside them."""
+
+    columns: dict[str, FloatArray]
+    notices: tuple[Notice, ...] = ()
+    counts: bool = False
+    labels: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(slots=True)
+class _Series:
+    """A channel: its values, its times (None: none stated), which samples are valid, and whose times they are."""
+
+    values: FloatArray
+    valid: NDArray[np.bool_] | None
+    clock: object
+    times: FloatArray | None
+
+
+def to_channels(table: Table, reading: Reading, limits: Limits) -> Channels:
+    """The channels that the names and `reading` choose.
+
+    Raises InvalidError where a unit or a clock is not clear, a value is no number, or nothing is known; TooLargeError on too
+    many values.
+    """
+    table, reading = widened(table, reading)
+    chosen = choose(table.columns, reading)
+    series, table, counts = _read(table, chosen, reading, limits)
+    notices = list(table.notices)
+    columns = _on_one_clock(series, notices)
+    columns, first = _chosen_table(columns, table, reading)
+    line_in_file = table.line_of
+    line_of = None if line_in_file is None else lambda row: line_in_file(first + row)
+    try:
+        check_columns(columns, line_of=line_of)
+    except InvalidError as error:
+        if not error.errors or error.errors[0].value != "nan":
+            raise
+        detail = f"{error.detail}: add missing=nan to leave such rows out"
+        raise InvalidError(detail, errors=error.errors, total=error.total) from None
+    _refuse_standing(columns)
+    return Channels(columns=columns, notices=tuple(notices), counts=counts, labels=labels(table.above))
+
+
+def _refuse_standing(columns: Mapping[str, FloatArray]) -> None:
+    """Raise InvalidError where the time stays as it is from row to row: a clock that is coarser than the rows is none."""
+    time_s = columns.get("time_s")
+    if time_s is None or len(columns) == 1 or not stands(time_s):
+        return
+    still = np.count_nonzero(np.diff(time_s) == 0)
+    message = (
+        f"time_s does not advance in {still} of {time_s.size - 1} steps: the clock is coarser than the rows. Name a "
+        f"column of finer times with time=NAME; if each row is a plateau, send time={NO_TIME}"
+    )
+    raise InvalidError.of(message, code="time_stands", pointer="/channels/time_s")
+
+
+def _chosen_table(columns: dict[str, FloatArray], table: Table, reading: Reading) -> tuple[dict[str, FloatArray], int]:
+    """The one table, or of several below each other the one that is named by its number (`2`, `Sheet/2`), and its first row.
+
+    Titles that only interrupt a table, whose time goes on after them, begin no other.
+    """
+    time_s = columns.get("time_s")
+    starts = [0, *table.breaks, next(iter(columns.values())).size]
+    tables = [f"{table.name}/{number}" if table.name else str(number) for number in range(1, len(starts))]
+    if table.breaks and time_s is not None and reading.table not in tables:
+        steps = np.diff(time_s)
+        if all(0 < steps[row - 1] < _LONGEST_PAUSE * np.median(steps) for row in table.breaks):
+            return columns, 0
+    asked_table = reading.table if table.breaks and reading.table != table.name else ""
+    number = index_of_wanted(tables, asked_table, "table")
+    return {name: column[starts[number] : starts[number + 1]] for name, column in columns.items()}, starts[number]
+
+
+def _clocks(
+    columns: Sequence[FileColumn], taken: Sequence[Taken], values: Mapping[int, FloatArray]
+) -> dict[int, Clock | None]:
+    """The clock of each column that is taken and is no time: a column of times, its recorder's, or none."""
+    times = {column.index: _column_clock(columns, column, values) for column in taken if column.channel == "time_s"}
+    clocks: dict[int, Clock | None] = {}
+    for index in (column.index for column in taken if column.channel != "time_s"):
+        recorder = columns[index].clock
+        of_group = [at for at in times if columns[at].group == columns[index].group]
+        if of_group:
+            chosen = max((at for at in of_group if at < index), default=of_group[0])
+            coarse = np.unique(values[chosen]).size < values[chosen].size
+            finer = recorder if recorder is not None and coarse and _agree(recorder.read(), values[chosen]) else None
+            clocks[index] = finer or times[chosen]
+        else:
+            clocks[index] = recorder or (next(iter(times.values())) if len(times) == 1 else None)
+    for unused, following in zip_longest(times, [*times][1:]):
+        if len(times) == 1 or times[unused] in clocks.values():
+            continue
+        if following is None or not _agree(values[unused], values[following]):
+            shown = " and ".join(columns[index].title or columns[index].shown() for index in [*times][:_MAX_NAMED])
+            raise several_times(shown)
+        if np.unique(values[unused]).size > np.unique(values[following]).size:
+            clocks = {at: times[unused] if clock is times[following] else clock for at, clock in clocks.items()}
+    return clocks
+
+
+def _column_clock(columns: Sequence[FileColumn], column: Taken, values: Mapping[int, FloatArray]) -> Clock:
+    """A column as a clock. LabVIEW's text files number their rows where they have no clock, so a guessed time column, or one
+    with whole numbers from 0, may be a sample counter (`counts`)."""
+    times = values[column.index]
+    counts = column.guessed or (is_counter(columns[column.index]) and np.array_equal(times, np.arange(times.size)))
+    return Clock(column.index, lambda: times, counts=counts)
+
+
+def _agree(times: FloatArray, others: FloatArray) -> bool:
+    """Whether two columns tell the same time since their beginning, within the resolution of the coarser."""
+    if times.size != others.size:
+        return False
+    steps = [step[step > 0].min(initial=np.inf) for step in (np.diff(times), np.diff(others))]
+    max_difference = np.abs(times - times[:1] - others + others[:1]).max(initial=0.0)
+    return bool(max_difference <= max(steps) * (1 + 1e-9))
+
+
+def _runs_on(times: FloatArray) -> bool:
+    """Whether a column may be a clock: nine of ten of its steps go on. Chosen: of durations in any order half do."""
+    steps = np.diff(times[~np.isnan(times)])
+    return bool(steps.size > 0 and np.count_nonzero(steps > 0) >= _MOST_OF * steps.size)
+
+
+def _add_part(times: FloatArray, parts: Mapping[int, FloatArray]) -> int | None:
+    """Add to times in whole seconds, in place, the part of the second that stands in a column of its own: which one."""
+    for at, seconds in parts.items() if stands(times) else ():
+        if ((seconds >= 0) & (seconds < 1)).all() and (np.diff(times + seconds) > 0).all():
+            times += seconds - seconds[0]
+            return at
+    return None
+
+
+def _read(
+    table: Table, chosen: Sequence[Taken], reading: Reading, limits: Limits
+) -> tuple[dict[str, _Series], Table, bool]:
+    """The channels' values and times, the table without totals at its end, with notices, and whether their one clock may
+    only count."""
+    indices = [column.index for column in chosen]
+    stated = sum(table.columns[index].rows or 0 for index in indices)
+    if stated > limits.most_values:
+        raise TooLargeError(f"a file must not hold more than {limits.most_values} values, got {stated}")
+    channels = {column.index: column.channel for column in chosen}
+    says = [] if reading.missing == NO_MISSING else [i for i, own in enumerate(table.columns) if says_valid(own)]
+    parts = {}
+    if reading.time != NO_TIME and "time_s" in channels.values():
+        unused = {at: own for at, own in enumerate(table.columns) if at not in indices}
+        parts = {at: factor for at, own in unused.items() if (factor := part_of_second(own))}
+    read = read_cells(table, dict.fromkeys(says, "") | dict.fromkeys(parts, "time_s") | channels, reading)
+    read, table = drop_totals(read, [column.index for column in chosen if column.channel != "time_s"], table)
+    for column in chosen:
+        read[column.index] = mask_stated_marks(read[column.index], reading)
+        refuse_stand_ins(column.channel, read[column.index], table.line_of, reading)
+    values: dict[int, FloatArray] = {}
+    valid: dict[int, NDArray[np.bool_] | None] = {}
+    dated = [read[column.index] for column in chosen if read[column.index].dtype.kind == "M"]
+    start = min((moments[~np.isnat(moments)].min() for moments in dated if not np.isnat(moments).all()), default=None)
+    notices = list(table.notices)
+    for column in chosen:
+        values[column.index], valid[column.index] = _numbers(column, read.pop(column.index), start)
+        if column.channel == "time_s" and column.unit is None:
+            notices += _in_seconds(table.columns[column.index], values[column.index], reading)
+    part_seconds = {at: factor * plain(read.pop(at)) for at, factor in parts.items()}
+    added = [_add_part(values[column.index], part_seconds) for column in chosen if column.channel == "time_s"]
+    for name in (table.columns[at].shown() for at in added if at is not None):
+        message = f"time_s has whole seconds: the fractions in {name} were added"
+        notices.append(Notice(code="parts_of_seconds", message=message))
+    chosen = [column for column in chosen if not column.guessed or _runs_on(values[column.index])]
+    clocks = {} if reading.time == NO_TIME else _clocks(table.columns, chosen, values)
+    used = {clock.key: clock for clock in clocks.values() if clock is not None}
+    times = {key: clock.read() for key, clock in used.items()}
+    marked = [valid_rows(table.columns[index], read[index]) for index in says if index in read]
+    series = {}
+    for column in chosen:
+        if column.channel != "time_s":
+            clock = clocks.get(column.index)
+            key = None if clock is None else clock.key
+            whole = _Series(values[column.index], valid[column.index], key, times.get(key))
+            own = _drop_empty_rows(column.channel, whole, table, bool(marks(reading.missing)))
+            series[column.channel] = own
+            for good in marked:
+                if good is not None and good.size == own.values.size:
+                    own.valid = good if own.valid is None else own.valid & good
+    if not series:  # a time alone: shown as such, and refused for what it lacks
+        series = {"time_s": _Series(values[indices[0]], None, None, None)}
+    unread = {index: own for index, own in enumerate(table.columns) if index not in added}
+    table = replace(table, notices=[*notices, *_left_out(unread, chosen, reading)])
+    return series, table, len(used) == 1 and all(clock.counts for clock in used.values())
+
+
+def _drop_empty_rows(name: str, own: _Series, table: Table, leave_out: bool) -> _Series:
+    """A channel without the rows that hold neither it nor its time. Where at least every second of its cells is empty, its
+    rate is lower than that of the rows: it is the samples that are there.
+
+    `leave_out`: rows with any other empty cell are left out; else InvalidError is raised on them.
+    """
+    missing, invalid = np.isnan(own.values), own.valid
+    if table.line_of is not None and not leave_out:
+        own.valid = None  # a cell's mask says that it is empty
+    if own.times is not None and own.times.size == missing.size and not missing.all():
+        timeless = np.isnan(own.times)
+        keep = ~timeless if leave_out else ~(missing & timeless)
+        gaps = np.count_nonzero(missing & keep)
+        if gaps >= _MIN_GAPS and 2 * gaps >= np.count_nonzero(keep) - 1:
+            keep &= ~missing
+        if not keep.all():
+            valid = None if own.valid is None else own.valid[keep]
+            own = _Series(own.values[keep], valid, (own.clock, name), own.times[keep])
+            missing, invalid = missing[keep], None if invalid is None else invalid[keep]
+    if table.line_of is not None and not leave_out and invalid is not None and not invalid.all():
+        raise empty_cells(name, np.flatnonzero(~invalid).tolist(), table.line_of, missing.size - 1)
+    if own.times is not None and table.line_of is not None and np.isnan(own.times).any():
+        raise empty_cells("time_s", np.flatnonzero(np.isnan(own.times)).tolist(), table.line_of, own.times.size - 1)
+    return own
+
+
+def _numbers(column: Taken, values: NDArray[Any], start: Any) -> tuple[FloatArray, NDArray[np.bool_] | None]:
+    """Values in the channel's unit and which of them are valid; points in time as seconds since `start`.
+
+    Raises InvalidError on any other type.
+    """
+    mask = np.ma.getmaskarray(values) if isinstance(values, np.ma.MaskedArray) else None
+    valid = ~mask if mask is not None and mask.any() else None
+    values = np.asarray(values)
+    if column.channel == "time_s" and values.dtype.kind in "Mm":
+        since = values - start if values.dtype.kind == "M" and start is not None else values
+        return np.where(np.isnat(since), np.nan, since / _SECOND), valid
+    if values.dtype.kind not in "iuf" or values.ndim != 1:
+        shown = f"values of type {values.dtype}" if values.ndim == 1 else f"{values.ndim} dimensions"
+        message = f"{column.channel} must be a column of numbers, got {shown}"
+        raise InvalidError.of(message, code="not_a_number", pointer=f"/channels/{column.channel}")
+    numbers = np.array(values, dtype=np.float64) if values.dtype != np.float64 or not values.flags.writeable else values
+    column.conversion.apply(numbers)
+    return numbers, valid
+
+
+def _in_seconds(column: FileColumn, times: FloatArray, reading: Reading) -> list[Notice]:
+    """Scale times without a unit that only as one of a computer's counts are of our time, in place, from the first on, and
+    say so.
+
+    Raises InvalidError where no map takes them for seconds, or where they may be days as spreadsheets or MATLAB count them:
+    of our time since 1900 or the year 0, less than five of them, in steps that would be shorter than a rig samples.
+    """
+    for unit, factor in _COUNTED.items():
+        first, last = _OUR_TIME + (np.datetime64("1970-01-01") - np.datetime64(f"{unit[-4:]}-01-01")) / _SECOND
+        if times.size and times.min() / factor > first and times.max() / factor < last:
+            times -= times[0]
+            times /= factor
+            message = f"{column.shown()} states no unit; its values were read as times in {unit}"
+            return [Notice(code="unit_found", message=message)]
+    name = column.title or column.name
+    if "time_s" not in choices_of(reading):
+        raise no_unit([("time_s", column)], reading)
+    if times.size < 2:
+        return []
+    days = ((times > 20_000) & (times < 80_000)) | ((times > 700_000) & (times < 800_000))
+    step = np.median(np.diff(times))
+    fractions = times.min() >= 0 and times.max() <= 1 and 0 < step < _SECOND_OF_DAY
+    if not fractions and not (days.all() and np.ptp(times) < 5 and step < 1e-3):
+        return []
+    message = (
+        f"{column.shown()} states no unit: it begins at {times[0]:.9g} in steps of {step:.3g}, in seconds or days. "
+        f"State the unit with map=time_s:{name} [s], or [d]"
+    )
+    raise InvalidError.of(message, code="missing_unit", pointer="/map")
+
+
+def _left_out(columns: Mapping[int, FileColumn], taken: Sequence[Taken], reading: Reading) -> list[Notice]:
+    """Notices about columns of the table that are not used."""
+    notices = []
+    if part := [f"{column.channel} from {columns[column.index].shown()}" for column in taken if column.in_part]:
+        message = f"only a part of these titles was recognised, so check them: {', '.join(part)}"
+        notices.append(Notice(code="name_in_part", message=message))
+    used = {column.index for column in taken}
+    others = [column for index, column in columns.items() if index not in used and (column.title or column.name)]
+    if reading.time == NO_TIME:
+        others = [column for column in others if known_channel(column.name) != "time_s"]
+    if others:
+        names = ", ".join(column.shown() for column in others[:_MAX_NAMED])
+        more = f" and {len(others) - _MAX_NAMED} more" if len(others) > _MAX_NAMED else ""
+        message = f"columns left out, because their titles name no channel: {names}{more}"
+        notices.append(Notice(code=LEFT_OUT, message=message))
+    return notices
+
+
+def _on_one_clock(series: Mapping[str, _Series], notices: list[Notice]) -> dict[str, FloatArray]:
+    """The channels with one `time_s` where they have times; invalid samples left out."""
+    if "time_s" in series:
+        return {"time_s": series["time_s"].values}
+    leading = next((name for name in _LEADING if name in series), next(iter(series)))
+    lead = series[leading]
+    same = all(_same_clock(own, lead) for own in series.values())
+    sizes = {own.values.size for own in series.values()}
+    ragged = any(own.times is not None and own.times.size != own.values.size for own in series.values())
+    if ragged or (len(sizes) > 1 if same else any(own.times is None for own in series.values())):
+        rows = [f"{name} has {own.values.size}{' without times' * (own.times is None)}" for name, own in series.items()]
+        message = f"channels without times of their own must have the same number of rows, got: {', '.join(rows)}"
+        raise InvalidError.of(message, code="ragged")
+    columns: dict[str, FloatArray] = {} if lead.times is None else {"time_s": lead.times}
+    keep = np.ones(lead.values.size, dtype=np.bool_)
+    invalid: dict[str, int] = {}
+    for name, own in series.items():
+        valid = own.valid
+        if _same_clock(own, lead):
+            columns[name] = own.values
+        else:
+            columns[name], valid, inside = _resampled(name, own, lead)
+            keep &= inside
+        if valid is not None:
+            invalid[name] = int(np.count_nonzero(~valid))
+            keep &= valid
+    if not same:
+        notices.append(_brought(series, leading, keep))
+    if invalid:
+        shown = ", ".join(f"{name} {count}" for name, count in invalid.items())
+        message = f"samples with invalid values were left out of all channels; invalid values: {shown}"
+        notices.append(Notice(code="invalid_samples", message=message))
+    if keep.all():
+        return columns
+    if not keep.any():
+        message = "no sample is left: at each time at least one channel has no valid value"
+        raise InvalidError.of(f"{message}. Send channels recorded together", code="empty", pointer="/channels")
+    return {name: column[keep] for name, column in columns.items()}
+
+
+def _same_clock(series: _Series, other: _Series) -> bool:
+    if series.times is None or other.times is None:
+        return series.times is other.times
+    return series.clock == other.clock or np.array_equal(series.times, other.times)
+
+
+def _resampled(
+    name: str, own: _Series, lead: _Series
+) -> tuple[FloatArray, NDArray[np.bool_] | None, NDArray[np.bool_]]:
+    """A channel at the leading channel's times, straight between its samples: values, which are valid, which lie inside."""
+    assert own.times is not None  # noqa: S101 (seen to by the caller)
+    assert lead.times is not None  # noqa: S101
+    if own.times.size == 0 or not (np.diff(own.times) > 0).all():
+        message = f"{name} has times of its own, which must increase from row to row"
+        raise InvalidError.of(message, code="time_backwards", pointer=f"/channels/{name}")
+    after = np.clip(np.searchsorted(own.times, lead.times), 1, max(own.times.size - 1, 1))
+    valid = None
+    if own.valid is not None and own.times.size > 1:
+        valid = own.valid[after - 1] & own.valid[after]
+    # a sample of a slower channel stands until the next one is due
+    reach = max(0.0, _step(own.times) - _step(lead.times)) * (1 + 1e-9)
+    inside = (lead.times >= own.times[0] - reach) & (lead.times <= own.times[-1] + reach)
+    return np.interp(lead.times, own.times, own.values), valid, inside
+
+
+def _step(times: FloatArray) -> float:
+    """How far apart samples are [s]."""
+    return float(np.median(np.diff(times))) if times.size > 1 else 0.0
+
+
+def _brought(series: Mapping[str, _Series], leading: str, kept: NDArray[np.bool_]) -> Notice:
+    rates = []
+    for name, own in series.items():
+        if own.times is not None and not _same_clock(own, series[leading]):
+            step = _step(own.times)
+            rates.append(f"{name} ({own.values.size} samples, {step:.6g} s apart, from {own.times[0]:.9g} s)")
+    message = f"interpolated to the times of {leading}: {', '.join(rates)[: 5 * MAX_QUOTED]}"
+    if cut := int(np.count_nonzero(~kept)):
+        why = "because not all channels were recorded at their times"
+        message += f". {cut} of {kept.size} samples were left out, {why}"
+    return Notice(code="brought_to_one_clock", message=message)

@@ -1,0 +1,443 @@
+"""The table in a grid of cells: which rows are titles, units and data, whatever stands above them.
+
+Cells are text (CSV) or what a workbook holds. The data are the longest run of rows with numbers or times in the same
+columns, under the row of titles that knows most channels; a row of units, titles over two rows (merged cells), and a group's
+name over several columns may stand there too.
+"""
+
+import re
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise, zip_longest
+from typing import Any
+
+from service.errors import MAX_QUOTED, InvalidError, Notice
+from service.readers.column_names import bare_unit, column_of, is_counter, known_channel, recognised, with_unit
+from service.readers.limits import LONGEST_TITLE, LONGEST_UNIT
+from service.readers.numerals import NUMBER, is_stamp, with_unit_apart
+from service.readers.stated_clocks import stated_clock
+from service.readers.table import FileColumn, Table, labels
+from service.readers.unit_table import conversion, is_unit
+
+Row = Sequence[Any]
+
+#: The notice of a table that lies on its side.
+TURNED = Notice(code="turned", message="the table has a line for each channel: its columns were read as rows")
+
+#: Rows that are looked at for the table's beginning. Chosen: no recorder writes as many lines above it.
+MAX_ROWS = 500
+#: Rows of data that a person is shown.
+_MAX_SHOWN = 20
+#: Rows of a run by which two candidates are compared; longer ones count the same. Chosen: more than header blocks have.
+_LONG_RUN = 8
+#: Rows of text above the data among which titles and units are, at most; others between them do not count. Chosen: recorders
+#: write six (channel, title, unit, filter, place, sensor).
+_MAX_TITLE_ROWS = 12
+#: What a row begins with that names the units of the columns beside it.
+_UNIT_LABELS = re.compile(
+    r"[a-z]{0,2}_?unit[éàs]*(_label)?s?:?|einheit(en)?:?|unidad(es)?:?|单位|單位|単位", re.IGNORECASE
+)
+#: What a row of a table says that is made of the rows about it.
+_SUMMARY = re.compile(
+    r"(?:\d+[ _.:-]+)?[øØ∅⌀]?(?:mean|average|avg|mittel(?:werte?)?|moy(?:enne)?|media|promedio|medel(?:värde)?|"
+    r"max(?:im(?:um|a))?|min(?:im(?:um|a))?|sum(?:me)?|total|median|range|std(?:ev)?|stabw|standardabweichung|平均[値值]?|最[大小][値值]?|合[計计])\.?:?",
+    re.IGNORECASE,
+)
+#: What a row begins with that holds a factor for each column.
+_FACTORS = re.compile(r"\w*[ _]?(?:fa[ck]tor|gain|s[ck]al|slope|mult)", re.IGNORECASE)
+NUMERIC = re.compile(
+    r"[+−-]? *(\d[\d.,'’\u00a0\u202f\u2009]*+|[.,]\d++)( ?[dDeE][+-]?\d{1,4})?|[+−-]?(nan|inf|infinity)",
+    re.IGNORECASE | re.ASCII,
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Layout:
+    """Where a table is: of each column the title, unit, group and first cell; the row of its titles, the first row of data,
+    how many rows with numbers beside a label stand between, and a score by which other rows of titles compare."""
+
+    headings: tuple[tuple[str, str, str, Any], ...]
+    titles: int
+    start: int
+    labelled: int
+    score: tuple[int, int, int, int]
+
+    def texts(self) -> tuple[tuple[str, str, str], ...]:
+        """The titles, units and groups."""
+        return tuple((title, unit, group) for title, unit, group, _ in self.headings)
+
+    def fit(self) -> tuple[int, ...]:
+        """How well a separator or an encoding reads the table: known titles, less what they are more or fewer than cells."""
+        return self.score[0] + self.score[1], *self.score
+
+    def columns(self) -> tuple[FileColumn, ...]:
+        """The columns. Raises InvalidError on a title that is too long, or beside whose unit another is stated."""
+        return tuple(
+            column_of(title, group=group, moments=True)
+            if _is_moment(cell) or _is_word(title, cell)
+            else with_unit(column_of(title, unit, group), with_unit_apart(cell)[1])
+            for title, unit, group, cell in self.headings
+        )
+
+
+class DataRows:
+    """Which rows under a table's titles are its data: none that is blank, is one of those above again, or a footer."""
+
+    def __init__(self, rows: Sequence[Row], layout: Layout) -> None:
+        self.rows, self.layout, above = rows, layout, rows[: layout.start]
+        self.titles, self.first_row = rows[layout.titles], rows[layout.start] if layout.start < len(rows) else []
+        self._above = {tuple(row) for row in above if not all(map(is_value, row))}
+        #: The first row of data of each further table under the same titles.
+        self.breaks: list[int] = []
+        self.notices: list[Notice] = []
+        self._summaries: list[Row] = []
+        self._summarised = _is_summary(self.first_row)
+        if layout.labelled:
+            self._leave_out(above[-layout.labelled :], "above the first row of")
+
+    def of(self, rows: Iterable[tuple[int, Row]], before: int, *, last: bool) -> tuple[list[int], list[Any]]:
+        """Numbers and cells of those of the next rows that are data; `before` were found already, `last`: none follow."""
+        data_rows: list[tuple[int, Row]] = []
+        for number, row in rows:
+            if row == self.titles and before + len(data_rows):
+                self._split_footer(data_rows)
+                self.breaks.append(before + len(data_rows))
+            elif not is_blank(row) and tuple(row) not in self._above:
+                summary = not self._summarised and _is_summary(row) and any(map(is_value, row))
+                self._summaries += [row] if summary else []
+                data_rows += [] if summary else [(number, row)]
+        if last and (footer := self._split_footer(data_rows)):
+            self._leave_out(footer, "below")
+        return [number for number, _ in data_rows], [row for _, row in data_rows]
+
+    def end(self) -> None:
+        """Say what was left out among the rows, once all are read."""
+        if self._summaries:
+            self._leave_out(self._summaries, "of means, extremes or sums in")
+
+    def _split_footer(self, held: list[tuple[int, Row]]) -> list[Row]:
+        """The rows at the end of `held` that are words, or that a word begins (`Mean;5;100;20`): taken out of it."""
+        end = len(held)
+        while end and is_footer(held[end - 1][1], self.first_row):
+            end -= 1
+        footer = [row for _, row in held[end:]]
+        del held[end:]
+        return footer
+
+    def _leave_out(self, rows: Sequence[Row], where: str) -> None:
+        first = " ".join(shown(rows[0])).strip()[:MAX_QUOTED]
+        lines = "1 line" if len(rows) == 1 else f"{len(rows)} lines"
+        message = f"left out: {lines} {where} the table, beginning with {first!r}"
+        self.notices.append(Notice(code="lines_left_out", message=message))
+
+
+def _is_summary(row: Row) -> bool:
+    return any(isinstance(cell, str) and _SUMMARY.fullmatch(cell) is not None for cell in row)
+
+
+def table_in(data: DataRows, *, first_line: int, rows_read: Callable[[], int], **others: Any) -> Table:
+    """The table of a grid, each column with the clock that the rows above it state, or its own cell in them.
+
+    LabVIEW's column of times may be empty: then it is none. Raises InvalidError where a row above holds factors.
+    """
+    rows, layout = data.rows, data.layout
+    above = [shown(row) for row in rows[max(layout.start - MAX_ROWS, 0) : layout.start]]
+    refuse_factors(above)
+    head = [shown(row) for row in rows[layout.start : layout.start + _MAX_SHOWN]]
+    columns = list(layout.columns())
+    counted = _counted(columns, head)
+    for place, column in enumerate(columns):
+        if is_counter(column) and shown(data.first_row)[place : place + 1] == ("",):
+            columns[place] = FileColumn("", title=column.title)
+            continue
+        own_rows = [row for row in above if len(row) > place and row[place]]
+        labelled = [(row[0], row[place]) if place and row in own_rows else row for row in above]
+        clock = stated_clock(labels([*labelled, *((row[place],) for row in own_rows)]), rows_read, counted)
+        columns[place] = replace(column, clock=clock)
+    return Table(
+        columns=tuple(columns),
+        above=tuple(above[: layout.titles - layout.start]),
+        first_line=first_line,
+        head=tuple(head),
+        breaks=data.breaks,
+        notices=data.notices,
+        **others,
+    )
+
+
+def _counted(columns: Sequence[FileColumn], head: Sequence[Sequence[str]]) -> str:
+    """Which column of whole numbers that is no channel counts samples in steps of several; "" where none does."""
+    for place, column in enumerate(columns):
+        cells = [row[place] for row in head if len(row) > place]
+        if column.unit or len(cells) < _LONG_RUN or known_channel(column.name) or not all(map(str.isdecimal, cells)):
+            continue
+        steps = {int(b) - int(a) for a, b in pairwise(cell[:15] for cell in cells)}
+        if len(steps) == 1 and max(steps) > 1:
+            return f"{column.shown()} rises by {max(steps)} a row"
+    return ""
+
+
+def shown(row: Row) -> tuple[str, ...]:
+    """The cells of a row as text."""
+    return tuple(str(int(cell)) if isinstance(cell, float) and cell.is_integer() else _text(cell) for cell in row)
+
+
+def find_table(rows: Sequence[Row], comments: frozenset[int], named: Sequence[str]) -> Layout | None:
+    """The table in the first rows of a grid; None where no row of titles stands over numbers.
+
+    `comments` are rows that may hold titles and no data; `named` are titles that the caller names.
+    """
+    runs = list(_runs(rows, comments)) or [(len(rows), 0)]
+    rows = [*rows, ()]
+    candidates = []
+    for start, length in runs:
+        layout = _layout(rows, comments, start, length, named)
+        # titles without data are a table too, where they are known and nothing but units is under them
+        if layout and not layout.score[3]:
+            bare = all(is_blank(row) or _are_units(row) for row in rows[layout.titles + 1 :])
+            layout = layout if layout.score[0] and bare else None
+        candidates += [layout] if layout else []
+    best = max(candidates, key=lambda layout: layout.score, default=None)
+    # titles that are repeated within the data do not begin another table, nor do numbers with a label above them
+    for layout in candidates:
+        if best and layout.texts() == best.texts() and not is_footer(rows[layout.start], rows[best.start]):
+            return layout
+    return None
+
+
+def _runs(rows: Sequence[Row], comments: frozenset[int]) -> Iterator[tuple[int, int]]:
+    """Runs of rows with a number or a time in them: where each starts and how many rows it has."""
+    start, length = 0, 0
+    for index, row in enumerate(rows):
+        if index in comments or is_blank(row):
+            continue
+        if _has_values(row):
+            start, length = (start, length + 1) if length else (index, 1)
+        elif length:
+            yield start, length
+            length = 0
+    if length:
+        yield start, length
+
+
+def _skip_labelled_rows(rows: Sequence[Row], comments: frozenset[int], start: int, length: int) -> tuple[int, int]:
+    """Where a run begins without its first rows that hold numbers of another kind beside a label (`Length;12;12`), and
+    how many those are."""
+    run = [index for index in range(start, len(rows)) if index not in comments and not is_blank(rows[index])][:length]
+    labelled = next((k for k, index in enumerate(run) if not is_footer(rows[index], rows[run[length // 2]])), 0)
+    return (run[labelled], labelled) if run else (start, 0)
+
+
+def is_blank(row: Row) -> bool:
+    """Whether a row holds nothing."""
+    return all(cell is None or cell == "" for cell in row)
+
+
+def is_value(cell: Any) -> bool:
+    """Whether a cell is a number or a point in time."""
+    if isinstance(cell, str):
+        return bool(cell) and (NUMERIC.fullmatch(cell) is not None or is_stamp(cell) or bool(with_unit_apart(cell)[1]))
+    return cell is not None and not isinstance(cell, bool)
+
+
+def _has_values(row: Row) -> bool:
+    """Whether a row holds values: not one of units of which some are multiples (`s;bar;0.01 Nm`)."""
+    values = [is_value(cell) for cell in row if cell not in (None, "")]
+    return any(values) and (all(values) or not _are_units(row))
+
+
+def refuse_factors(above: Sequence[Sequence[str]]) -> None:
+    """Raise InvalidError where a line above the data has factors of the columns, which may be applied to them or not."""
+    for index, row in enumerate(above):
+        for place, cell in enumerate(row[1:], 1):
+            below = [other[place] for other in above[index + 1 :] if len(other) > place]
+            under = [number for number in below if NUMBER.fullmatch(number)]
+            if _FACTORS.match(cell) and len(under) > 1 and {*map(float, under)} != {1.0}:
+                row = (cell, *under)
+        numbers = [cell for cell in row[1:] if NUMBER.fullmatch(cell.replace(",", "."))]
+        factors = [cell for cell in numbers if float(cell.replace(",", ".")) != 1]
+        if len(numbers) > 1 and factors and _FACTORS.match(row[0]):
+            what = f"the line {row[0][:MAX_QUOTED]!r} holds factors, such as {factors[0]}"
+            ask = "are the values already multiplied? If so, delete this line; if not, multiply them first"
+            raise InvalidError.of(f"{what}: {ask}", code="raw_counts")
+
+
+def is_footer(row: Row, other: Row) -> bool:
+    """Whether a row is none of the table of `other`: it begins with a word where that has none; or has no value."""
+    place, cell = next(((place, cell) for place, cell in enumerate(row) if cell not in (None, "")), (0, None))
+    if cell is None or is_value(cell):
+        return False
+    neighbour = other[place] if place < len(other) else None
+    return neighbour in (None, "") or is_value(neighbour) or not any(map(is_value, row))
+
+
+def _is_moment(cell: Any) -> bool:
+    """Whether a cell is a point in time or a duration, which needs no unit."""
+    return is_stamp(cell) if isinstance(cell, str) else hasattr(cell, "resolution")
+
+
+def _is_word(title: str, cell: Any) -> bool:
+    """Whether a column of the time holds words: no unit is what it lacks."""
+    return isinstance(cell, str) and bool(cell) and not is_value(cell) and known_channel(title) == "time_s"
+
+
+def _layout(
+    rows: Sequence[Row], comments: frozenset[int], start: int, length: int, named: Sequence[str]
+) -> Layout | None:
+    """The layout of the data from row `start` on: the row above them that knows most channels has the titles."""
+    start, labelled = _skip_labelled_rows(rows[:-1], comments, start, length)
+    above = _text_rows_above(rows, comments, start)
+    width = max((index + 1 for index, cell in enumerate(rows[start]) if cell not in (None, "")), default=0)
+    data = [row for row in rows[start : start + length] if not is_blank(row)][:_LONG_RUN]
+    best: tuple[tuple[int, int, int], list[str], int] | None = None
+    for place, at in enumerate(above):
+        for titles in _titles(rows, above[place:], width, data):
+            filled = sum(map(bool, titles))
+            channel_count = recognised(titles, named)
+            enough = filled >= width if at in comments else filled >= min(2, width) or channel_count
+            rank = (
+                channel_count,
+                -abs(len(titles) - width) - LONGEST_TITLE * (max(map(len, titles), default=0) > LONGEST_TITLE),
+                int(not _are_units(titles)),
+            )
+            if enough and (best is None or rank > best[0]):
+                best = rank, titles, at
+    if best is None:
+        return None
+    rank, titles, at = best
+    units = _units(rows, [row for row in above if row > at], at, start, titles, width)
+    groups = _filled([_text(cell) for cell in rows[at - 1]], len(titles)) if at - 1 in above else []
+    twice = len(set(filter(None, titles))) < sum(map(bool, titles))
+    extra_rows = (units[: len(titles)], groups if twice else (), rows[start][: len(titles)])
+    headings = tuple(zip_longest(titles, *extra_rows, fillvalue=""))
+    misfits = sum(bool(unit) and not _fits(title, unit) for title, unit, _, _ in headings)
+    score = (rank[0] - misfits, rank[1], min(length - labelled, _LONG_RUN), sum(map(is_value, rows[start])))
+    return Layout(headings=headings, titles=at, start=start, labelled=labelled, score=score)
+
+
+def _text_rows_above(rows: Sequence[Row], comments: frozenset[int], start: int) -> list[int]:
+    """The nearest rows of text above the data, the lowest first. Numbers with a label (`Length;12;12`), and those of the
+    columns, may stand between them."""
+    text_rows: list[int] = []
+    for index in range(start - 1, -1, -1):
+        row = rows[index]
+        if index in comments or not _has_values(row):
+            text_rows += [] if is_blank(row) else [index]
+        elif not is_footer(row, rows[start]) and [_text(cell) for cell in row] != [str(k + 1) for k in range(len(row))]:
+            break
+        if len(text_rows) == _MAX_TITLE_ROWS:
+            break
+    return text_rows
+
+
+def _titles(rows: Sequence[Row], upwards: Sequence[int], width: int, data: Sequence[Row]) -> Iterator[list[str]]:
+    """The titles that a row may give: its own texts, those of all columns but the first, its gaps filled from above, and
+    both rows' texts joined."""
+    titles_row = [_text(cell) for cell in rows[upwards[0]]]
+    while titles_row and not titles_row[-1]:
+        titles_row.pop()
+    yield titles_row
+    if _are_units(titles_row):
+        return
+    if len(titles_row) == width - 1 and _have_names(data, titles_row):
+        yield ["", *titles_row]
+    for row in upwards[1:2] if len(titles_row) > 1 else upwards[1:]:
+        above = [_text(cell) for cell in rows[row]]
+        if sum(map(bool, above)) < 2 or (len(titles_row) < 2 and _are_units(above)):
+            continue
+        size = max(len(titles_row), min(len(above), width))
+        padded = titles_row + [""] * (size - len(titles_row))
+        above += [""] * (size - len(above))
+        yield [name or other for name, other in zip(padded, above, strict=False)]
+        yield [f"{other} {name}".strip() for name, other in zip(padded, _filled(above, size), strict=False)]
+
+
+def _have_names(rows: Sequence[Row], titles: Sequence[str]) -> bool:
+    """Whether rows of data begin with a name that no title stands above, as R writes them: a word, or numbers that count,
+    where the column after that of the times runs on as times do."""
+    first = [_text(row[0]) for row in rows]
+    if len(first) < 2 or not any(map(is_value, first)):
+        return len(first) > 1 and all(first)
+    names = [column_of(title[:LONGEST_TITLE]).name for title in titles]
+    timed = [place for place, name in enumerate(names) if known_channel(name) == "time_s"]
+    if not timed or not all(cell.isdecimal() and len(cell) < LONGEST_UNIT for cell in first):
+        return False
+    numbers = [_text(row[timed[0] + 1]).replace(",", ".") for row in rows if len(row) == len(titles) + 1]
+    runs_on = all(NUMBER.fullmatch(cell) for cell in numbers) and all(b > a for a, b in pairwise(map(float, numbers)))
+    return all(int(b) == int(a) + 1 for a, b in pairwise(first)) and runs_on and len(numbers) == len(rows)
+
+
+def _filled(texts: Sequence[str], size: int) -> list[str]:
+    """The texts of merged cells, each over the empty ones after it."""
+    filled = [*texts, *[""] * size][:size]
+    for place in range(1, size):
+        filled[place] = filled[place] or filled[place - 1]
+    return filled
+
+
+def _text(cell: Any) -> str:
+    return "" if cell is None else str(cell).strip()
+
+
+def _are_units(row: Row) -> bool:
+    """Whether all that is there are units, under a word that says so or none."""
+    labelled = bool(row) and _UNIT_LABELS.fullmatch(_text(row[0])) is not None
+    stated = [unit for unit in map(bare_unit, map(_text, row[labelled:])) if unit]
+    return bool(stated) and all(map(is_unit, stated))
+
+
+def _units(
+    rows: Sequence[Row], below: Sequence[int], at: int, start: int, titles: Sequence[str], width: int
+) -> list[str]:
+    """The units beside the titles in row `at`: of the rows under it, one over it and those that are labelled so, and of the
+    ways in which these may stand to the titles, those that hold most units of them."""
+    texts = {index: [_text(cell) for cell in rows[index]] for index in range(max(0, start - MAX_ROWS), start)}
+    labelled = [index for index, row in texts.items() if row and _UNIT_LABELS.fullmatch(row[0])]
+    over = [at - 1] if at and _are_units(texts[at - 1]) else []
+    best: Sequence[str] = []
+    for index in (*below, *over, *labelled):
+        if index != at and texts[index] != texts[at]:
+            placements = _placements_of_units(texts[index], titles, width)
+            best = max(best, *placements, key=lambda units: sum(map(_fits, titles, units)))
+    return ["" if _UNIT_LABELS.fullmatch(unit) else unit for unit in best]
+
+
+def _placements_of_units(units: Sequence[str], titles: Sequence[str], width: int) -> Iterator[Sequence[str]]:
+    """A row of units as it stands to the titles, each under its own; or, where every one fits then, those of all columns
+    that are known, or known and no time, one after the other, as writers leave out what needs none."""
+    yield units
+    stated = [unit for unit in units if unit and not _UNIT_LABELS.fullmatch(unit)]
+    channels = [known_channel(column_of(title).name) if len(title) <= LONGEST_TITLE else None for title in titles]
+    for unitless in (None,), (None, "time_s"):
+        places = [place for place, channel in enumerate(channels) if channel not in unitless]
+        in_order = dict(zip(places, stated, strict=False))
+        fits = all(_fits(titles[place], unit) for place, unit in in_order.items())
+        if fits and len(places) == len(stated) and places[-1:] < [width]:
+            yield [in_order.get(place, "") for place in range(len(titles))]
+
+
+def _fits(title: str, cell: str) -> bool:
+    """Whether a cell is a unit of its title, or any where the title is not known."""
+    unit, channel = bare_unit(cell) or "", known_channel(title)
+    return is_unit(unit) if channel is None else conversion(channel, unit) is not None
+
+
+def turned(rows: Sequence[Row], named: Sequence[str]) -> tuple[list[Row], Layout] | None:
+    """The rows of a table that lies on its side, a line a channel, and its layout; None where it does not."""
+    on_its_side: list[Row] = list(zip_longest(*rows, fillvalue=""))
+    layout = find_table(on_its_side[:MAX_ROWS], frozenset(), named) if len(on_its_side) > 2 else None
+    upright = max((recognised(list(map(_text, row)), named) for row in rows[:MAX_ROWS]), default=0)
+    return None if layout is None or layout.score[0] < upright else (on_its_side, layout)
+
+
+def no_table(rows: Sequence[Row], named: Sequence[str]) -> InvalidError:
+    """The error of a text or sheet without a row of titles over numbers: what stands where the one or the others should."""
+    filled = [index for index, row in enumerate(rows) if not is_blank(row)] or [0]
+    best = max(filled, key=lambda index: recognised(list(map(_text, rows[index])), named) if rows else 0)
+    under = next((index for index in filled if index > best), None)
+    if under is not None and recognised(list(map(_text, rows[best])), named):
+        place, rule = under, f"a row of numbers, under the titles of line {best + 1}"
+    else:
+        place, rule = filled[0], "a header with the channels' names, above rows of numbers"
+    got = " ".join(map(_text, rows[place] if rows else ())).strip()[:MAX_QUOTED]
+    return InvalidError.of(f"line {place + 1} must be {rule}, got {got!r}", code="no_header", value=got)

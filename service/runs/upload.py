@@ -1,0 +1,125 @@
+"""A run posted as a file -> `IncomingRun`: the file holds the channels, the request or the rig's profile everything else."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, replace
+from datetime import datetime
+from pathlib import Path
+
+from models.arrays import FloatArray
+from models.records.cleaning import UnusableRecordError
+from models.records.plateaus import cut_plateaus
+from service.api.rig import RigProfile
+from service.channels import PLATE_TEMPERATURES, check_columns
+from service.clutch.incoming_run import IncomingRun, SampledChannels, name_run
+from service.errors import FieldError, InvalidError, Notice
+from service.readers.assemble import LEFT_OUT, Channels
+from service.readers.read_file import read_file
+from service.readers.table import ColumnChoice, Reading
+from service.runs.rig_profile import Named, named
+
+#: The channels that each kind of run must have, and the channels that it may have.
+NEEDED = {
+    "stationary_stribeck": ("pressure_bar", "speed_rpm", "torque_nm"),
+    "dynamic_stribeck": ("time_s", "pressure_bar", "speed_rpm", "torque_nm"),
+}
+_ALLOWED = {
+    "stationary_stribeck": ("time_s", "oil_temperature_c", *PLATE_TEMPERATURES, "torque_sd_nm"),
+    "dynamic_stribeck": ("oil_temperature_c", *PLATE_TEMPERATURES),
+}
+
+
+def read_file_run(
+    path: Path,
+    *,
+    filename: str,
+    kind: str | None,
+    cycles: float | None,
+    run_id: str | None = None,
+    started_at: datetime | None = None,
+    origin: str = "measured",
+    reading: Reading | None = None,
+    profile: RigProfile | None = None,
+    rig: str | None = None,
+) -> IncomingRun:
+    """The run in a file, read by a profile, the stored one of `rig`, where one is given; what is given beside it wins.
+
+    Raises InvalidError or TooLargeError naming what is wrong.
+    """
+    reading = reading_with(profile, reading or Reading())
+    read = read_file(path, filename=filename, reading=reading)
+    stated = Named() if profile is None else named(profile, filename, read.labels)
+    kind, cycles = kind or stated.kind, stated.cycles if cycles is None else cycles
+    if kind is None or cycles is None:
+        name = "kind" if kind is None else "cycles"
+        where = f"the rig profile finds no {name} for {filename!r}"
+        if profile is None:
+            where = "no rig profile was named, which could find it"
+        raise InvalidError.of(f"{name} must be given: {where}", code="missing", pointer=f"/query/{name}")
+    head = IncomingRun(
+        kind=kind,
+        cycles=cycles,
+        run_id=run_id or stated.run_id or "",
+        started_at=None if started_at is None else started_at.isoformat(),
+        origin=origin,
+        file={"filename": filename, "rig": rig, "reading": asdict(reading)},
+    )
+    return run_of(read, head)
+
+
+def run_of(read: Channels, head: IncomingRun) -> IncomingRun:
+    """The run with the channels that were read. Raises InvalidError where they do not make one of its kind."""
+    kind, columns, notices = head.kind, read.columns, list(read.notices)
+    missing = [name for name in NEEDED[kind] if name not in columns]
+    if missing:
+        errors = [
+            FieldError(pointer=f"/channels/{name}", code="missing", message=f"the file has no channel {name}")
+            for name in missing
+        ]
+        message = f"a {kind} run needs {', '.join(missing)}; channels found: {', '.join(columns) or 'none'}"
+        # a column that was left out may be the missing channel
+        if left_out := next((notice.message for notice in notices if notice.code == LEFT_OUT), ""):
+            message += f"; {left_out}; choose one of them with map={missing[0]}:NAME"
+        raise InvalidError(message, errors=errors)
+    if kind == "stationary_stribeck" and read.counts and _holds_no_dwell(columns):
+        message = (
+            "the times in the file only count the rows, so each row was read as a plateau. If the rows are samples, send "
+            "the samples' times"
+        )
+        notices.append(Notice(code="counting_clock", message=message))
+        columns = {name: column for name, column in columns.items() if name != "time_s"}
+        check_columns(columns)  # a plateau has no negative pressure, which a sample may have
+    accepted = (*NEEDED[kind], *_ALLOWED[kind])
+    channels = {name: column for name, column in columns.items() if name in accepted}
+    file = {**(head.file or {}), "warnings": [asdict(notice) for notice in notices]}
+    return name_run(replace(head, channels=channels, file=file))
+
+
+def reading_with(profile: RigProfile | None, reading: Reading) -> Reading:
+    """How a file is read by a profile; what `reading` says itself wins."""
+    if profile is None:
+        return reading
+    choices: dict[str, ColumnChoice] = {
+        own.channel: ColumnChoice(
+            column=own.title, unit=own.unit, stated=own.stated, factor=own.scale, offset=own.offset
+        )
+        for own in profile.columns
+        if own.channel
+    }
+    return replace(
+        reading,
+        mapping=reading.mapping or choices,
+        only_named=not reading.mapping,
+        table=reading.table or profile.table or "",
+        decimal=reading.decimal or profile.decimal or "",
+        skip_rows=reading.skip_rows or profile.skip_rows,
+        missing=reading.missing or profile.missing or "",
+    )
+
+
+def _holds_no_dwell(columns: Mapping[str, FloatArray]) -> bool:
+    """Whether a record by its times is no test: nothing in it stays as it is for a while."""
+    try:
+        cut_plateaus(SampledChannels(columns))
+    except UnusableRecordError:
+        return True
+    return False
