@@ -43,7 +43,7 @@ class Slip:
     unit: str = ""
 
 
-class _Run(NamedTuple):
+class _RunFields(NamedTuple):
     name: str
     kind: str
     cycles: float
@@ -57,7 +57,7 @@ class _Run(NamedTuple):
     fixed: bool = False
 
 
-class Run(_Run):
+class Run(_RunFields):
     """A run at the `cycles` as sent: its `reading` as it came in, and the `slips` of its channels that are possible, both
     made when they are asked for, since of a long history few runs are looked at.
 

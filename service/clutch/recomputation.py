@@ -88,7 +88,7 @@ class ClutchHistory:
 
     @cached_property
     def lives(self) -> tuple[timeline.Life, ...]:
-        """The timeline cut at its rebuilds."""
+        """The history cut at its rebuilds."""
         return tuple(timeline.lives_of(self.events))
 
     @cached_property

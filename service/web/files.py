@@ -131,7 +131,7 @@ def preferred(request: Request, media_types: Sequence[str]) -> str:
 
 
 @dataclass(slots=True)
-class _Made:
+class _SharedCopy:
     """A copy that is being made or sent, and how many answers it is for."""
 
     making: "asyncio.Task[Copy]"
@@ -146,7 +146,7 @@ class Copies:
         self._folder = folder
         self._most = most
         self._room = Room(most)
-        self._made: dict[str, _Made] = {}
+        self._made: dict[str, _SharedCopy] = {}
         self._ending: set[asyncio.Task[None]] = set()
 
     async def of(self, tag: str, make: Callable[[Path], "Future[Any]"]) -> "Copy":
@@ -154,7 +154,7 @@ class Copies:
         being sent leave no room."""
         made = self._made.get(tag)
         if made is None:
-            made = self._made[tag] = _Made(asyncio.create_task(self._written(tag, make)))
+            made = self._made[tag] = _SharedCopy(asyncio.create_task(self._written(tag, make)))
         made.users += 1
         try:
             return await asyncio.shield(made.making)

@@ -68,9 +68,11 @@ def test_a_seed_gives_the_same_answer_twice_from_stored_arrays_too(tracker: Any)
     state = followed(tracker, PRIOR, CAMPAIGN[:7], seed=5)
     arrays = state.to_arrays()
     assert arrays.keys() == STORED_NAMES[tracker.name]
-    # in the order of the fields of Prior, of which 0.05 is the share of outlying runs and 0.1 their size
+    # in the order of the fields of TrackPrior, of which 0.05 is the share of outlying runs and 0.1 their size
     assert arrays["prior"].tolist()[10:] == [0.05, 0.1, 0.95, 0.05, EQ_6_SHARE, PROPORTIONAL_SHARE, KNEE_HAZARD]
-    assert all(column.dtype == np.float64 for column in arrays.values())
+    flags = ["outlying"] if tracker.name == "particle" else []
+    assert [name for name, column in arrays.items() if column.dtype == np.bool_] == flags
+    assert all(column.dtype == np.float64 for name, column in arrays.items() if name not in flags)
     before, again = (
         type(state).from_arrays({name: column.copy() for name, column in reversed(arrays.items())}) for _ in range(2)
     )
