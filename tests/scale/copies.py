@@ -12,9 +12,10 @@ from service.changes.edit_clutch import register
 from service.changes.ingest_run import ingest
 from service.runs.json_run import read_run
 from service.runs.simulated import simulated_body
+from storage.checksums import of_values
 from storage.dialects import TEXT
 from storage.engine.opening import open_database
-from storage.tables import change, channel, clutch, filter_state, metadata, prediction, run
+from storage.tables import CHECKSUM, change, channel, clutch, filter_state, metadata, prediction, run
 
 AT = "2026-01-01T00:00:00+00:00"
 
@@ -82,12 +83,30 @@ def multiply(address: str, count: int) -> None:
             values = [_of_copy(column, copies, last) for column in columns]
             rows = sa.select(*values).select_from(table.join(copies, sa.true()))
             connection.execute(sa.insert(table).from_select([column.name for column in columns], rows))
+            if CHECKSUM in table.c:
+                _seal(connection, table)
         if engine.dialect.name == "postgresql":  # keys were given here: the next is the sequence's
             greatest = sa.select(sa.func.max(run.c.run_key)).scalar_subquery()
             connection.execute(sa.select(sa.func.setval(sa.func.pg_get_serial_sequence("run", _OF_RUN), greatest)))
     with engine.connect().execution_options(isolation_level="AUTOCOMMIT") as connection:
         connection.exec_driver_sql("ANALYZE" if engine.dialect.name == "sqlite" else "VACUUM ANALYZE")
     engine.dispose()
+
+
+def _seal(connection: sa.Connection, table: sa.Table) -> None:
+    """Give every row the checksum of what it holds, in one statement."""
+    keys = list(table.primary_key)
+    update = (
+        sa.update(table)
+        .where(*(key == sa.bindparam(f"at_{key.name}") for key in keys))
+        .values({CHECKSUM: sa.bindparam("sum")})
+    )
+    seals = [
+        {f"at_{key.name}": row[key.name] for key in keys} | {"sum": of_values(table, dict(row))}
+        for row in connection.execute(sa.select(table)).mappings()
+    ]
+    if seals:
+        connection.execute(update, seals)
 
 
 def _of_copy(column: sa.Column[Any], copies: sa.Table, runs: int) -> sa.ColumnElement[Any]:
