@@ -6,8 +6,9 @@ import json
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar
 
+from service.api.base import Page
 from service.errors import InvalidError
 
 #: Items of a list that is answered whole where no limit is given.
@@ -17,6 +18,7 @@ LONGEST_CURSOR = 600
 #: Where a page ended: a number, and a name where that is not unique.
 Place = tuple[float, str]
 Row = TypeVar("Row")
+Listed = TypeVar("Listed", bound=Page[Any])
 
 
 def to_cursor(place: Place | None) -> str | None:
@@ -61,20 +63,31 @@ class Part:
         return "" if self.after is None else self.after[1]
 
     def of(
-        self, rows: Sequence[Row], place: Callable[[Row], Place], item: Callable[[Row], dict[str, Any]]
-    ) -> dict[str, Any]:
-        """The items of the rows that were read, `most` of them, each of which has its `place` in the list."""
-        return page([item(row) for row in rows[: self.limit]], self.next(rows, place))
+        self,
+        page: type[Listed],
+        rows: Sequence[Row],
+        place: Callable[[Row], Place],
+        item: Callable[[Row], object],
+    ) -> Listed:
+        """The page with the items of the rows that were read, `most` of them, each of which has its `place` in the list."""
+        return page(items=[item(row) for row in rows[: self.limit]], next=to_cursor(self.next(rows, place)))
 
     def next(self, rows: Sequence[Row], place: Callable[[Row], Place]) -> Place | None:
         """Where the next part begins, None where these rows are the last."""
         return place(rows[self.limit - 1]) if len(rows) > self.limit else None
 
-    def sliced(self, items: Sequence[Any]) -> dict[str, Any]:
-        """The page cut from a complete list; the cursor is the position in the list."""
+    def sliced(self, items: Sequence[Row]) -> "Slice[Row]":
+        """What is cut from a complete list; the cursor is the position in the list."""
         start = int(max(0.0, self.number or 0.0))
         stop = start + self.limit
-        return page(items[start:stop], (float(stop), "") if stop < len(items) else None)
+        return Slice(items[start:stop], to_cursor((float(stop), "") if stop < len(items) else None))
+
+
+class Slice(NamedTuple, Generic[Row]):
+    """The items of a part of a complete list, and the cursor of the next part."""
+
+    items: Sequence[Row]
+    next: str | None
 
 
 #: All of a list.
@@ -94,11 +107,6 @@ def by_key(name: str) -> Callable[[Any], Place]:
 def by_cycles(name: str) -> Callable[[Any], Place]:
     """The place of a row in a list that is ordered by cycles, and at equal cycles by a name."""
     return lambda row: (row.cycles, getattr(row, name))
-
-
-def page(items: Sequence[Any], after: Place | None) -> dict[str, Any]:
-    """The shape of every list."""
-    return {"items": items, "next": to_cursor(after)}
 
 
 def page_as_bytes(items: Sequence[bytes], after: Place | None) -> bytes:

@@ -22,10 +22,14 @@ from models.friction.stribeck import PARAMETER_NAMES
 from models.prognosis.ended_lives import ObservedLife
 from models.prognosis.fleet import FleetPrior
 from service.alarms import raising
-from service.api.base import schema_fields
+from service.api.base import Answer, of_row
 from service.api.clutch import ClutchIn, LatestDiagnosis
+from service.api.fleet import Kind
 from service.api.inspection import InspectionOut, PhotographOut
-from service.api.rig import RigOut
+from service.api.life import LifePrediction, PriorName
+from service.api.over_life import MeasuredEngagement
+from service.api.rig import RigIn, RigOut
+from service.api.run import Evaluation, Receipt
 from service.channels import content_of, instant, whole
 from service.clutch import items
 from service.clutch.analysis import LevelFit, analyse
@@ -33,14 +37,13 @@ from service.clutch.assumptions import ALL_PRESSURES, FLEET, LearnedPrior, kind_
 from service.clutch.condition import DISAGREES, rank_of, state_of, top_line
 from service.clutch.engagements import DUTY_KINDS, StoredEngagement, stored_engagement
 from service.clutch.incoming_run import IncomingRun, content_hash
-from service.clutch.items import notice_items
+from service.clutch.items import doubted
 from service.clutch.model_correction import RunReader, extension_of
 from service.clutch.plausibility.doubts import Judged, doubts_alone
 from service.clutch.recomputation import (
     Adoption,
     ClutchHistory,
     Levels,
-    Receipt,
     Results,
     Tracking,
     computed_again,
@@ -108,8 +111,7 @@ def rig(connection: Connection, name: str) -> RigOut:
 
 def rig_out(row: RigRow) -> RigOut:
     """A stored profile, with the defaults of fields that came after it."""
-    saved = {"version": row.version, "saved_at": row.saved_at, "saved_by": row.saved_by}
-    return RigOut.model_validate(row.content | saved)
+    return of_row(RigOut, row, **dict(RigIn.model_validate(row.content)))
 
 
 def record(row: ClutchRow) -> ClutchIn:
@@ -145,7 +147,7 @@ def state(
     exponents = {None, *(extension.severity_exponent for extension in extensions if extension is not None)}
     severities = {severity_under(own, exponent) for exponent in exponents}
     last = results.prediction_at(connection, clutch_id, CARRIED[0], ALL_PRESSURES)
-    tracked = {} if last is None or newest_prior or damaged or edited is not None else last.payload
+    tracked = None if last is None or newest_prior or damaged or edited is not None else prediction(last)
     return ClutchHistory(
         record=own,
         revision=row.revision,
@@ -203,15 +205,21 @@ def levels(connection: Connection, clutch_id: str) -> dict[str, list[LevelFit]]:
     return levels_of(connection, clutch_id)
 
 
-def receipt(row: RunRow) -> dict[str, Any]:
+def json_of(answer: Answer) -> Json:
+    """An answer's part as a JSON column keeps it."""
+    return answer.model_dump(mode="json", exclude_unset=True)
+
+
+def prediction(row: PredictionRow) -> LifePrediction:
+    """A stored prediction."""
+    return LifePrediction.model_validate(row.payload)
+
+
+def receipt(row: RunRow) -> Receipt:
     """A run's receipt as it is now: as it is stored, and whether the run counts, why not, and the cycles as sent."""
     sent_cycles = row.cycles if row.sent_cycles is None else row.sent_cycles
-    return row.receipt | {
-        "state": row.state,
-        "doubts": list(row.doubts),
-        "sent_cycles": whole(sent_cycles),
-        "received_by": row.received_by,
-    }
+    present = {"state": row.state, "doubts": row.doubts, "sent_cycles": whole(sent_cycles)}
+    return Receipt.model_validate(row.receipt | present | {"received_by": row.received_by})
 
 
 def summary(row: RunRow) -> dict[str, Any]:
@@ -219,9 +227,9 @@ def summary(row: RunRow) -> dict[str, Any]:
     return {"state": row.state, "cycles": whole(row.cycles), "doubts": list(row.doubts)}
 
 
-def receipts(connection: Connection, clutch_id: str) -> dict[str, dict[str, Any]]:
+def receipts(connection: Connection, clutch_id: str) -> dict[str, Evaluation]:
     """All receipts of a clutch by run_id, as they are stored."""
-    return {row.run_id: row.receipt for row in runs.page(connection, clutch_id)}
+    return {row.run_id: Evaluation.model_validate(row.receipt) for row in runs.page(connection, clutch_id)}
 
 
 def answers(connection: Connection, clutch_id: str) -> list[Any]:
@@ -250,7 +258,7 @@ def _store_judged(connection: Connection, clutch_id: str, judged: Judged, *, at:
         row = runs.get(connection, clutch_id, event.run_id)
         if row is None:
             raise LookupError(f"run {event.run_id!r} of clutch {clutch_id!r} is not stored")
-        doubts = tuple(notice_items(judged.doubts.get(event.run_id, ())))
+        doubts = tuple(doubted(judged.doubts.get(event.run_id, ())))
         after = replace(row, state=new_state, doubts=doubts)
         runs.set_state(
             connection, row.run_key, state=new_state, cycles=row.cycles, sent_cycles=row.sent_cycles, doubts=doubts
@@ -298,9 +306,11 @@ def store(connection: Connection, clutch_id: str, computed: Results) -> None:
             results.write_fits(connection, rows[run_id], fit_rows(own, computed.cofs.get(run_id, {})))
         for run_id, receipt in computed.receipts.items():
             if run_id in computed.details:
-                runs.set_results(connection, rows[run_id], computed.details[run_id], receipt, CODE_VERSION)
+                runs.set_results(
+                    connection, rows[run_id], dict(computed.details[run_id]), json_of(receipt), CODE_VERSION
+                )
             else:
-                runs.set_receipt(connection, rows[run_id], receipt)
+                runs.set_receipt(connection, rows[run_id], json_of(receipt))
     if computed.corrected_again:
         assumptions.clear_corrected_cofs(connection, clutch_id)
     for run_id, cofs in computed.corrected.items():
@@ -312,7 +322,7 @@ def store(connection: Connection, clutch_id: str, computed: Results) -> None:
             connection,
             clutch_id,
             rank_of(computed.summary),
-            computed.summary,
+            dict(computed.summary),
             life=computed.summary.get("life", ""),
             state=state_of(computed.summary, disputed=False)["name"],
             if_disputed=state_of(computed.summary, disputed=True)["name"],
@@ -320,10 +330,10 @@ def store(connection: Connection, clutch_id: str, computed: Results) -> None:
         raising.evaluate(connection, clutch_id)
 
 
-def ask_fleet_refresh(connection: Connection, kind: Json | None, *, by: str, at: str, learned: bool = False) -> None:
+def ask_fleet_refresh(connection: Connection, kind: Kind | None, *, by: str, at: str, learned: bool = False) -> None:
     """Have the fleet of a kind (None: all) learn again, for what an ended life teaches has changed; where it has `learned`,
     only have its clutches tracked under that. Unless a job that will do it waits already."""
-    fleet = None if kind is None else assumptions.fleet_key(kind)
+    fleet = None if kind is None else assumptions.fleet_key(json_of(kind))
     for row in jobs.open_of(connection, jobs.FLEET_REFRESH):
         if row.state == jobs.WAITING and row.of in (fleet, None) and row.arguments.get("learned", False) <= learned:
             return
@@ -343,8 +353,8 @@ def _store_tracking(connection: Connection, clutch_id: str, tracking: Tracking) 
         results.clear_predictions(connection, clutch_id)
     made: dict[str, Any] = {"pressure": ALL_PRESSURES, "code_version": CODE_VERSION}
     predictions = [
-        PredictionRow(cycles=prediction.cycles, method=prediction.method, payload=prediction.payload, **made)
-        for prediction in tracking.predictions
+        PredictionRow(cycles=each.cycles, method=each.method, payload=json_of(each.prediction), **made)
+        for each in tracking.predictions
     ]
     filters = [
         FilterStateRow(method=method, runs=tracked.runs, arrays=tracked.to_arrays(), **made)
@@ -367,14 +377,14 @@ def _filters(connection: Connection, clutch_id: str) -> States | None:
 
 
 def _learned_prior(
-    connection: Connection, own: ClutchIn, severity: Severity, tracked: Mapping[str, Any]
+    connection: Connection, own: ClutchIn, severity: Severity, tracked: LifePrediction | None
 ) -> LearnedPrior:
     """The prior of the clutch's kind not learned from it: the one that the prediction `tracked` names, or the newest."""
     version = None
-    if tracked.get("severity") == severity_name(severity) and "prior" in tracked:
-        version = tracked["prior"]["version"] or 0
+    if tracked is not None and tracked.severity == severity_name(severity):
+        version = tracked.prior.version or 0
     try:
-        row = assumptions.fleet_prior_for(connection, kind_of(own, severity), own.clutch_id, version)
+        row = assumptions.fleet_prior_for(connection, json_of(kind_of(own, severity)), own.clutch_id, version)
     except DamagedData as error:
         _log.warning("%s: the weak prior takes its place until the next clutchlife fleet refresh", error)
         row = None
@@ -382,9 +392,8 @@ def _learned_prior(
         return LearnedPrior()
     fleet = FleetPrior.from_dict(row.content)
     ended = tuple(ObservedLife.from_dict(life) for name in ("ended", "censored") for life in row.content.get(name, ()))
-    return LearnedPrior(
-        fleet=fleet, ended=ended, name={"name": FLEET, "version": row.version, "clutches": fleet.clutches}
-    )
+    name = PriorName(name=FLEET, version=row.version, clutches=fleet.clutches)
+    return LearnedPrior(fleet=fleet, ended=ended, name=name)
 
 
 def fit_rows(own: Sequence[LevelFit], cofs: ByPressure) -> list[FitRow]:
@@ -410,12 +419,12 @@ def fit_rows(own: Sequence[LevelFit], cofs: ByPressure) -> list[FitRow]:
     return rows
 
 
-def latest_diagnosis(row: ClutchRow, verdict: VerdictRow | None) -> dict[str, Any] | None:
+def latest_diagnosis(row: ClutchRow, verdict: VerdictRow | None) -> LatestDiagnosis | None:
     """The newest finished diagnosis as it goes out; one of a life that a rebuild has ended is past."""
     if verdict is None:
         return None
     earlier = verdict.life != row.summary.get("life", "")
-    return schema_fields(
+    return of_row(
         LatestDiagnosis,
         verdict,
         causes=list(verdict.causes),
@@ -430,7 +439,7 @@ def condition(row: ClutchRow) -> dict[str, str]:
     return state_of(row.summary, disputed=row.is_disputed, silent=row.silent)
 
 
-def first_line(row: ClutchRow, diagnosis: dict[str, Any] | None) -> dict[str, str]:
+def first_line(row: ClutchRow, diagnosis: LatestDiagnosis | None) -> dict[str, str]:
     """What stands first of the clutch: `headline` and `action`; `diagnosis` is its newest one as it goes out."""
     return top_line(row.summary, disputed=row.is_disputed, diagnosis=diagnosis, silent=row.silent)
 
@@ -458,10 +467,11 @@ def inspection_hash(content: Mapping[str, Any]) -> str:
     return content_of({**content, "performed_at": instant(content["performed_at"])})
 
 
-def inspection_answers(connection: Connection, rows: Sequence[InspectionRow]) -> list[dict[str, Any]]:
+def inspection_answers(connection: Connection, rows: Sequence[InspectionRow]) -> list[InspectionOut]:
+    """Inspections with their photographs."""
     photographs = inspections.photographs(connection, [row.inspection_key for row in rows])
     return [
-        schema_fields(
+        of_row(
             InspectionOut,
             row,
             **row.content,
@@ -472,8 +482,9 @@ def inspection_answers(connection: Connection, rows: Sequence[InspectionRow]) ->
     ]
 
 
-def photograph_answer(row: PhotographRow) -> dict[str, Any]:
-    return schema_fields(PhotographOut, row, photograph_id=row.sha256)
+def photograph_answer(row: PhotographRow) -> PhotographOut:
+    """A photograph as it goes out."""
+    return of_row(PhotographOut, row, photograph_id=row.sha256)
 
 
 def evidence(connection: Connection, clutch_id: str, *, of_fits: bool = False) -> ClutchMeasurements:
@@ -493,7 +504,9 @@ def evidence_for(database: Database, state: ClutchHistory, reader: RunReader) ->
         return replace(evidence(connection, state.clutch_id), reader=reader)
 
 
-def tracked_again(database: Database, state: ClutchHistory, levels: Levels, receipts: Mapping[str, Receipt]) -> Results:
+def tracked_again(
+    database: Database, state: ClutchHistory, levels: Levels, receipts: Mapping[str, Evaluation]
+) -> Results:
     """Results of a clutch whose state has changed while its runs are unchanged."""
     reader = run_reader(database, state.clutch_id)
     final, computed = computed_again(state, levels, receipts, reader, evaluated=stationary_tests_of(state.events))
@@ -501,15 +514,20 @@ def tracked_again(database: Database, state: ClutchHistory, levels: Levels, rece
     return replace(computed, summary=summarised(final, computed.tracking or Tracking(), evidence))
 
 
-def engagements(connection: Connection, clutch_id: str) -> list[dict[str, Any]]:
+def engagements(connection: Connection, clutch_id: str) -> list[MeasuredEngagement]:
     """The accepted engagements of a clutch with all indicators, by life and cycles."""
     stored = _engagements(connection, clutch_id)
     return engagement_rows(events(connection, clutch_id), stored) if stored else []
 
 
+def _at(row: RunRow) -> Evaluation:
+    """A run's receipt with its present cycles."""
+    return Evaluation.model_validate(row.receipt | {"cycles": whole(row.cycles)})
+
+
 def _engagements(connection: Connection, clutch_id: str) -> dict[str, StoredEngagement]:
     rows = [row for kind in DUTY_KINDS for row in runs.page(connection, clutch_id, kind=kind)]
-    stored = {row.run_id: stored_engagement(row.receipt | {"cycles": whole(row.cycles)}, row.details) for row in rows}
+    stored = {row.run_id: stored_engagement(_at(row), row.details) for row in rows}
     return {run_id: engagement for run_id, engagement in stored.items() if engagement is not None}
 
 

@@ -159,7 +159,7 @@ class Settings(BaseSettings):
                 for meant in get_close_matches(name.upper(), names, 1, cutoff=_ALIKE):
                     yield f"{name} is no setting and has no effect; is {meant} meant?"
 
-    def shown(self) -> dict[str, Any]:
+    def shown(self) -> dict[str, object]:
         return self.model_dump() | {"database": redacted(self.database)}
 
 

@@ -12,6 +12,7 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Mapping
 from contextlib import redirect_stdout
 from pathlib import Path
 from typing import Any
@@ -77,7 +78,7 @@ def send(url: str, body: bytes, *, secret: str, delivery_id: str, private: bool)
     return receivers.Attempt() if reply.get("sent") else receivers.Attempt(problem=reply["problem"])
 
 
-def _exchange(task: dict[str, Any]) -> dict[str, Any]:
+def _exchange(task: Mapping[str, object]) -> Mapping[str, Any]:
     """What the process of its own answers: a message is sent where the task has one, else the address is looked at."""
     command = [*PYTHON, "-m", "service.alarms.notify"]
     try:

@@ -9,14 +9,13 @@ import secrets
 from collections.abc import Iterable
 from dataclasses import replace
 from datetime import UTC, datetime
-from typing import Any
 
 from sqlalchemy import Connection
 
 from service.alarms import rules
 from service.alarms.rules import ClutchFacts, Finding
 from service.api.alarm import AlarmIn, EventOut
-from service.api.base import schema_fields
+from service.api.base import of_row
 from service.api.clutch import ClutchIn
 from service.clutch.condition import state_of
 from storage import alarms, clutches, webhooks
@@ -67,9 +66,9 @@ def rule_of(row: AlarmRow) -> AlarmIn:
     return AlarmIn.model_validate(row.content)
 
 
-def event_out(row: EventRow) -> dict[str, Any]:
-    content = {name: value for name, value in row.content.items() if name != _ENDED_LIFE}
-    return schema_fields(EventOut, row, **content)
+def event_out(row: EventRow) -> EventOut:
+    """An alarm as it goes out."""
+    return of_row(EventOut, row, **{name: value for name, value in row.content.items() if name != _ENDED_LIFE})
 
 
 def to_receivers(connection: Connection, kind: str, event: EventRow, receivers: Iterable[WebhookRow]) -> list[str]:
@@ -77,7 +76,7 @@ def to_receivers(connection: Connection, kind: str, event: EventRow, receivers: 
     names = []
     for receiver in receivers:
         delivery_id = secrets.token_hex(8)
-        body = {"type": kind, "delivery_id": delivery_id, "event": event_out(event)}
+        body = {"type": kind, "delivery_id": delivery_id, "event": event_out(event).model_dump(mode="json")}
         row = DeliveryRow(
             delivery_id=delivery_id,
             webhook_id=receiver.webhook_id,

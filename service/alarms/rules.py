@@ -192,7 +192,7 @@ def _state(rule: AlarmIn, facts: ClutchFacts) -> Finding | None:
     if name not in (rule.any_of or [other for other in condition.STATE_WORDS if other != condition.NORMAL]):
         return None
     known = condition.stated(facts.summary)
-    clauses = dict.fromkeys([state["why"], *([known["statement"]] if known else [])])
+    clauses = dict.fromkeys([state["why"], *([known.statement] if known else [])])
     return Finding(value=None, words=f"{condition.STATE_WORDS[name].lower()}: {'; '.join(clauses)}", mark=name)
 
 

@@ -17,6 +17,9 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from pydantic import BaseModel
+
+from service.api.base import Answer
 from service.errors import BusyError
 from service.paging import LONGEST_CURSOR
 from service.settings import CODE_VERSION
@@ -47,8 +50,8 @@ BUILD = build_of(Path(__file__).parents[2] / name for name in ("models", "storag
 
 
 @dataclass(frozen=True, slots=True)
-class Page:
-    """The bytes of a page whose format has no place for the next one's cursor, and that cursor, None on the last page."""
+class CsvPage:
+    """The bytes of a page as CSV, which has no place for the next one's cursor, and that cursor, None on the last page."""
 
     body: bytes
     next: str | None
@@ -68,18 +71,18 @@ class CachedAnswer:
         return len(self.body) + KEPT_BESIDE_BYTES
 
     @classmethod
-    def of(cls, made: bytes | Page) -> "CachedAnswer":
+    def of(cls, made: bytes | CsvPage) -> "CachedAnswer":
         """The answer with its tag. The tag of a page covers its cursor, which is not in its bytes."""
-        if isinstance(made, Page):
+        if isinstance(made, CsvPage):
             digest = hashlib.sha256(made.body + (made.next or "").encode())
             return cls(made.body, f'"{digest.hexdigest()[:32]}"', made.next)
         goes_on = _GOES_ON.search(made, max(0, len(made) - LONGEST_CURSOR - 32))
         return cls(made, f'"{hashlib.sha256(made).hexdigest()[:32]}"', None if goes_on is None else goes_on[1].decode())
 
 
-def to_json(payload: object) -> bytes:
-    """JSON in UTF-8; ValueError on a number that JSON cannot carry: none may leave."""
-    return to_text(payload).encode()
+def to_json(answer: BaseModel) -> bytes:
+    """The one encoder of answers: JSON in UTF-8, fields in their order; ValueError on a number that JSON cannot carry."""
+    return to_text(answer.model_dump(mode="json", exclude_unset=isinstance(answer, Answer))).encode()
 
 
 def name_of(query: Callable[..., object]) -> str:
@@ -88,7 +91,7 @@ def name_of(query: Callable[..., object]) -> str:
 
 
 def revision_and_json(
-    database: Database, query: Callable[..., dict[str, Any]], clutch_id: str, arguments: tuple[Hashable, ...]
+    database: Database, query: Callable[..., BaseModel], clutch_id: str, arguments: tuple[Hashable, ...]
 ) -> tuple[int, bytes]:
     """A clutch's revision, and what `query(database, clutch_id, *arguments)` gives at that or a later one, as JSON.
 
@@ -161,7 +164,7 @@ class AnswerCache:
             self._begun += 1
             self._hold(key, version, answer, self._begun)
 
-    def answer(self, key: Hashable, version: Hashable, make: Callable[[], bytes | Page]) -> CachedAnswer:
+    def answer(self, key: Hashable, version: Hashable, make: Callable[[], bytes | CsvPage]) -> CachedAnswer:
         """The answer for `key` and `version`, made by `make` where it is not there. All who wait get what that raises."""
         with self._lock:
             cached = self._current(key, version)
@@ -188,7 +191,7 @@ class AnswerCache:
         self,
         key: Hashable,
         version: Hashable,
-        make: Callable[[], bytes | Page],
+        make: Callable[[], bytes | CsvPage],
         pending: "Future[CachedAnswer]",
         begun: int,
     ) -> None:

@@ -3,15 +3,15 @@
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import Any
 
 from sqlalchemy import Connection
 
 from models.prognosis.criteria import HORIZON
 from service import repository
 from service.answers.cache import AnswerCache, to_json
-from service.api.base import schema_fields
-from service.api.clutch import ClutchOut
+from service.api.base import of_row
+from service.api.clutch import ClutchOut, LatestDiagnosis
+from service.api.fleet import FleetTotals, StateCounts
 from service.clutch.condition import STATES, stated
 from service.paging import Part, by_name, page_as_bytes
 from storage import clutches, diagnoses, runs
@@ -23,14 +23,14 @@ from storage.engine.database import Database
 _FITTING, _USUAL_SCALE = 0.9, 10_000.0
 
 
-def look_up(database: Database, clutch_id: str) -> dict[str, Any]:
+def look_up(database: Database, clutch_id: str) -> ClutchOut:
     """A clutch; raises NotFoundError."""
     with database.reading() as connection:
         (shown,) = _shown(connection, [repository.clutch(connection, clutch_id)])
     return _item(shown)
 
 
-def every(database: Database, *, at_once: int) -> Iterator[dict[str, Any]]:
+def every(database: Database, *, at_once: int) -> Iterator[ClutchOut]:
     """All clutches in use by their names, so many of them in memory."""
     part: Part | None = Part(at_once)
     while part is not None:
@@ -58,7 +58,7 @@ def page_as_json(
 
     def item(clutch: _Shown) -> bytes:
         row, _, diagnosis, _ = clutch
-        version = (row.revision, row.state, to_json(diagnosis))
+        version = (row.revision, row.state, None if diagnosis is None else to_json(diagnosis))
         return cache.answer(("clutch", row.clutch_id), version, lambda: to_json(_item(clutch))).body
 
     places = {
@@ -69,19 +69,19 @@ def page_as_json(
     return page_as_bytes(list(map(item, clutches_shown)), part.next(rows, places[sort]))
 
 
-def totals(database: Database, choice: ClutchSelection) -> dict[str, Any]:
+def totals(database: Database, choice: ClutchSelection) -> FleetTotals:
     """How many clutches of a choice there are, and the cycles at the right end of their intervals' bars."""
     with database.reading() as connection:
         listed = clutches.counts(connection, choice)
         archived = clutches.counts(connection, replace(choice, archived=True))
         boundary = clutches.at_rank(connection, replace(choice, find=""), _FITTING, below=HORIZON)
-    return {
-        "all": sum(listed.states.values()),
-        "archived": sum(archived.states.values()),
-        "held": listed.held,
-        "states": {name: listed.states.get(name, 0) for name in STATES},
-        "scale_cycles": _USUAL_SCALE if boundary is None else _round_above(boundary),
-    }
+    return FleetTotals(
+        all=sum(listed.states.values()),
+        archived=sum(archived.states.values()),
+        held=listed.held,
+        states=StateCounts(**{name: listed.states.get(name, 0) for name in STATES}),
+        scale_cycles=_USUAL_SCALE if boundary is None else _round_above(boundary),
+    )
 
 
 def _round_above(row: ClutchRow) -> float:
@@ -94,7 +94,7 @@ def _round_above(row: ClutchRow) -> float:
 
 #: A clutch with the number of its held runs, its newest finished diagnosis as it goes out, and its state with headline and
 #: action.
-_Shown = tuple[ClutchRow, int, dict[str, Any] | None, dict[str, Any]]
+_Shown = tuple[ClutchRow, int, LatestDiagnosis | None, dict[str, object]]
 
 
 def _shown(connection: Connection, rows: Sequence[ClutchRow]) -> list[_Shown]:
@@ -103,17 +103,20 @@ def _shown(connection: Connection, rows: Sequence[ClutchRow]) -> list[_Shown]:
     shown = []
     for row in rows:
         diagnosis = repository.latest_diagnosis(row, newest.get(row.clutch_id))
-        state = {"state": repository.condition(row)} | repository.first_line(row, diagnosis)
+        state: dict[str, object] = {"state": repository.condition(row), **repository.first_line(row, diagnosis)}
         shown.append((row, held_counts.get(row.clutch_id, 0), diagnosis, state))
     return shown
 
 
-def _item(clutch: _Shown) -> dict[str, Any]:
+def _item(clutch: _Shown) -> ClutchOut:
     row, held, diagnosis, state = clutch
-    from_summary = {
-        "runs": row.summary.get("runs", 0),
-        "recent": row.summary.get("recent"),
-        "summary": stated(row.summary),
-    }
-    extra = state | from_summary | {"held": held, "diagnosis": diagnosis}
-    return schema_fields(ClutchOut, row, **repository.record(row).model_dump(mode="json") | extra)
+    return of_row(
+        ClutchOut,
+        row,
+        **repository.record(row).model_dump(mode="json") | state,
+        runs=row.summary.get("runs", 0),
+        recent=row.summary.get("recent"),
+        summary=stated(row.summary),
+        held=held,
+        diagnosis=diagnosis,
+    )

@@ -2,7 +2,6 @@
 parameters (`models.prognosis.from_parameters`)."""
 
 from collections.abc import Hashable, Iterable, Iterator, Mapping
-from typing import Any
 
 import numpy as np
 
@@ -12,10 +11,19 @@ from models.prognosis.first_passage import ends_of_life, horizon_at
 from models.prognosis.first_passage import paths as track_paths
 from models.prognosis.from_parameters import CofPaths, disagreement, far_apart, mean_cof_paths
 from service import repository
-from service.clutch.assumptions import ALL_PRESSURES
+from service.api.life import MethodName
+from service.api.over_life import (
+    Degradation,
+    DegradationItem,
+    Disagreement,
+    Rebuilt,
+    SeverityWeighed,
+    Trajectory,
+)
+from service.clutch.assumptions import ALL_PRESSURES, severity_name
 from service.clutch.condition import held_runs_left_out
 from service.clutch.criteria import SEVERITY_EXPONENTS
-from service.clutch.items import notice_items
+from service.clutch.items import by_quantile, warned
 from service.clutch.quantities.items import COEFFICIENTS, paths_item, track_item, trajectory_cycles
 from service.clutch.quantities.measured import (
     QUANTITIES,
@@ -36,6 +44,7 @@ from service.clutch.timeline import Series, reference_velocities
 from service.clutch.tracking import offset_of, step_rng
 from service.clutch.with_held import measured_life
 from service.errors import Notice
+from service.tables import Cells, cells
 from storage.engine.database import Database
 
 COLUMNS = (
@@ -53,13 +62,13 @@ _MEAN_COF = QUANTITIES["mean_cof"]
 def degradation(
     database: Database,
     clutch_id: str,
-    method: str = "grid",
+    method: MethodName = "grid",
     quantity: str | None = None,
     at_cycles: float | None = None,
     life: int | None = None,
     draws: int = 0,
     until: float | None = None,
-) -> dict[str, Any]:
+) -> Degradation:
     """The tracks of a life by a filter: of one quantity wherever it was measured, or of mean COF and every parameter.
 
     As it was at `at_cycles`, of the present life or of an earlier one by its number; with so many joint `draws` of the
@@ -71,26 +80,28 @@ def degradation(
         chosen = chosen_life(state, life, at_cycles)
         evidence = repository.evidence(connection, clutch_id, of_fits=_follows_from_fits(asked_quantity))
     measured = measured_life(state, chosen, evidence)
-    held_fields = held_runs_left_out(len(chosen.held))
-    head = {"clutch_id": clutch_id, "revision": state.revision, "method": method, "life": chosen.item()}
-    if measured is None or (asked_quantity is None and not measured.life.reference):
-        nothing: dict[str, Any] = {"items": [], "rebuilt": None, "severity_estimate": None}
-        return head | nothing | held_fields | chosen.assumptions.named() | {"next": None}
-    estimate = None
-    if asked_quantity is None:
+    items, from_parameters, estimate = list[DegradationItem](), None, None
+    if measured is not None and asked_quantity is not None:
+        items = _items(measured, asked_quantity, method, draws, until)
+    elif measured is not None and measured.life.reference:
         items, from_parameters = _all_tracks(measured, method, draws, until)
         estimate = severity_estimate(measured.life, measured.assumptions)
-    else:
-        items, from_parameters = _items(measured, asked_quantity, method, draws, until), None
-    doubted = [] if estimate is None else estimate.doubts(measured.assumptions.severity)
-    answered = {
-        "items": items,
-        "rebuilt": from_parameters,
-        "severity_estimate": _severity_item(estimate),
-        "held_runs": held_fields["held_runs"],
-        "warnings": [*notice_items([*_disagreements(from_parameters), *doubted]), *held_fields["warnings"]],
-    }
-    return head | answered | chosen.assumptions.named() | {"next": None}
+    doubted = [] if estimate is None else estimate.doubts(chosen.assumptions.severity)
+    return Degradation(
+        clutch_id=clutch_id,
+        revision=state.revision,
+        method=method,
+        life=chosen.item(),
+        items=items,
+        rebuilt=from_parameters,
+        severity_estimate=_severity_item(estimate),
+        held_runs=len(chosen.held),
+        warnings=[*warned([*_disagreements(from_parameters), *doubted]), *held_runs_left_out(len(chosen.held))],
+        model=chosen.assumptions.model.name,
+        prior=chosen.assumptions.prior.name,
+        severity=severity_name(chosen.assumptions.severity),
+        next=None,
+    )
 
 
 def _follows_from_fits(quantity: Quantity | None) -> bool:
@@ -113,7 +124,7 @@ def arguments(
 
 def _all_tracks(
     measured: MeasuredLife, method: str, draws: int, until: float | None
-) -> tuple[list[dict[str, Any]], dict[str, Any] | None]:
+) -> tuple[list[DegradationItem], Rebuilt | None]:
     """Mean COF, every parameter, and mean COF from the parameters."""
     direct = _tracked(measured.series(_MEAN_COF), method)
     tracks = parameter_tracks(measured.life, measured.assumptions, measured.tests, method)
@@ -130,7 +141,7 @@ def _all_tracks(
 
 def _items(
     measured: MeasuredLife, quantity: Quantity, method: str, draws: int, until: float | None
-) -> list[dict[str, Any]]:
+) -> list[DegradationItem]:
     """One quantity wherever it was measured."""
     if quantity.family is Family.SLOPE:
         return _slopes(measured, quantity, method, until)
@@ -140,7 +151,7 @@ def _items(
     ]
 
 
-def _slopes(measured: MeasuredLife, quantity: Quantity, method: str, until: float | None) -> list[dict[str, Any]]:
+def _slopes(measured: MeasuredLife, quantity: Quantity, method: str, until: float | None) -> list[DegradationItem]:
     """Slopes from the joint tracks of the parameters at their pressure."""
     slopes = measured.series(quantity)
     tracks = parameter_tracks(measured.life, measured.assumptions, measured.tests, method)
@@ -159,21 +170,19 @@ def _tracked(several: Iterable[Series], method: str) -> list[Track]:
     return [(series, posterior_of(series, method)) for series in several if series.measurements]
 
 
-def rows(payload: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
+def rows(answer: Degradation) -> Iterator[Cells]:
     """Eq. 6's coefficients as rows of a table, a row a quantity and place."""
-    for item in payload["items"]:
-        coefficients = item["coefficients"] or {name: {"value": None, "sd": None} for name in COEFFICIENTS}
+    for item in answer.items:
+        estimates = {name: getattr(item.coefficients, name, None) for name in COEFFICIENTS}
         yield (
-            {name: item[name] for name in COLUMNS[:5]}
-            | {"held_runs": payload["held_runs"]}
-            | {name: coefficients[name]["value"] for name in COEFFICIENTS}
-            | {f"{name}_sd": coefficients[name]["sd"] for name in COEFFICIENTS}
+            cells(item, COLUMNS[:5])
+            | {"held_runs": answer.held_runs}
+            | {name: getattr(estimate, "value", None) for name, estimate in estimates.items()}
+            | {f"{name}_sd": getattr(estimate, "sd", None) for name, estimate in estimates.items()}
         )
 
 
-def _from_parameters(
-    measured: MeasuredLife, tracks: ParameterTracks, direct: Mapping[float, Track]
-) -> dict[str, Any] | None:
+def _from_parameters(measured: MeasuredLife, tracks: ParameterTracks, direct: Mapping[float, Track]) -> Rebuilt | None:
     """Mean COF from the parameters, in the public shape; None with too few tests. `direct`: its own tracks by pressure."""
     life, (series, _) = measured.life, direct[ALL_PRESSURES]
     tested = {measurement.progress for measurement in series.measurements}
@@ -193,23 +202,23 @@ def _from_parameters(
         reference_cofs=[cof for cof, _ in life.reference.values()],
         rng=step_rng("rebuilt", series, len(series.measurements)),
     )
-    return None if paths is None else _payload(paths, direct[ALL_PRESSURES], measured.fraction)
+    return None if paths is None else _rebuilt(paths, direct[ALL_PRESSURES], measured.fraction)
 
 
-def _severity_item(estimate: SeverityPosterior | None) -> dict[str, Any] | None:
+def _severity_item(estimate: SeverityPosterior | None) -> SeverityWeighed | None:
     if estimate is None:
         return None
-    return {
-        "basis": estimate.basis.value,
-        "exponents": list(SEVERITY_EXPONENTS),
-        "probabilities": estimate.probability.tolist(),
-        "value": estimate.mean,
-        "sd": estimate.deviation,
-    }
+    return SeverityWeighed(
+        basis=estimate.basis.value,
+        exponents=list(SEVERITY_EXPONENTS),
+        probabilities=estimate.probability.tolist(),
+        value=estimate.mean,
+        sd=estimate.deviation,
+    )
 
 
-def _disagreements(payload: Mapping[str, Any] | None) -> list[Notice]:
-    if payload is None:
+def _disagreements(from_parameters: Rebuilt | None) -> list[Notice]:
+    if from_parameters is None:
         return []
     words = {"now_sd": "mean COF now", "end_of_life_sd": "the median end of life"}
     return [
@@ -218,12 +227,12 @@ def _disagreements(payload: Mapping[str, Any] | None) -> list[Notice]:
             message=f"{words[name]}, computed from the four Stribeck parameters, is {abs(value):.1f} standard deviations "
             f"{'above' if value > 0 else 'below'} its direct estimate. Look at the fits of the last tests",
         )
-        for name, value in payload["disagreement"].items()
-        if far_apart(value)
+        for name in words
+        if far_apart(value := getattr(from_parameters.disagreement, name))
     ]
 
 
-def _payload(paths: CofPaths, direct: Track, fraction: float) -> dict[str, Any]:
+def _rebuilt(paths: CofPaths, direct: Track, fraction: float) -> Rebuilt:
     """The paths of mean COF in the public shape, beside the direct track."""
     series, posterior = direct
     now = float(paths.progress[paths.now])
@@ -240,13 +249,13 @@ def _payload(paths: CofPaths, direct: Track, fraction: float) -> dict[str, Any]:
         posterior.weight,
         series.scale.origin,
     )
-    return {
-        "trajectory": {
-            "cycles": series.scale.cycles(paths.progress)[shown].tolist(),
-            **{name: row[shown].tolist() for name, row in zip(("lower", "median", "upper"), paths.band(), strict=True)},
-        },
-        "end_of_life_cycles": {
-            f"{q:g}": None if value > cap else value for q, value in zip(QUANTILES, quantiles, strict=True)
-        },
-        "disagreement": {"now_sd": differences.now, "end_of_life_sd": differences.end_of_life},
-    }
+    lower, median, upper = (row[shown].tolist() for row in paths.band())
+    return Rebuilt(
+        trajectory=Trajectory(
+            cycles=series.scale.cycles(paths.progress)[shown].tolist(), lower=lower, median=median, upper=upper
+        ),
+        end_of_life_cycles=by_quantile(
+            {q: None if value > cap else value for q, value in zip(QUANTILES, quantiles, strict=True)}
+        ),
+        disagreement=Disagreement(now_sd=differences.now, end_of_life_sd=differences.end_of_life),
+    )

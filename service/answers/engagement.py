@@ -1,7 +1,6 @@
 """`/engagement`: what a tracked clutch would give at any state of its degradation, and the measured ones beside it."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
@@ -12,6 +11,14 @@ from models.engagements.measured import EngagementIndicators, trace_times
 from models.engagements.simulation import Capacity, Drive, Engagement, PressureProfile, capacity_of, engage
 from models.friction.stribeck import StribeckParameters
 from service import repository
+from service.api.over_life import (
+    ComparedEngagement,
+    EngagementChannels,
+    EngagementOut,
+    EngagementTrace,
+    MeasuredEngagement,
+    ModelledEngagement,
+)
 from service.channels import PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM, whole
 from service.clutch.analysis import LevelFit
 from service.clutch.assumptions import Assumptions
@@ -24,7 +31,7 @@ from service.errors import NotFoundError
 from storage.engine.database import Database
 
 
-def engaged(database: Database, clutch_id: str, at_cycles: float | None, run_id: str | None = None) -> dict[str, Any]:
+def engaged(database: Database, clutch_id: str, at_cycles: float | None, run_id: str | None = None) -> EngagementOut:
     """The engagement that the tracked clutch would give at `at_cycles`, or now, and the measured ones.
 
     `run_id`: the measured engagement that is compared with the model; left out, the newest of that life by then. Raises
@@ -42,52 +49,49 @@ def engaged(database: Database, clutch_id: str, at_cycles: float | None, run_id:
     assumptions = state.assumptions()
     cycles = happened[-1].cycles if at_cycles is None else at_cycles
     row = _compared_row(measured, lives[-1], run_id)
-    moments = [cycles] if row is None else [cycles, float(row["cycles"])]
+    moments = [cycles] if row is None else [cycles, float(row.cycles)]
     capacities = [capacity_of(parameters) for parameters in _parameters(lives[-1], assumptions, levels, moments)]
     comparison = None
     if row is not None:
-        run = repository.run_reader(database, clutch_id).read(row["run_id"])
+        run = repository.run_reader(database, clutch_id).read(row.run_id)
         comparison = _comparison(run, row, capacities[-1], state.geometry)
-    return {
-        "clutch_id": clutch_id,
-        "origin": state.record.origin,
-        "simulated": True,
-        "at_cycles": whole(cycles),
-        "model": dict(assumptions.model.name),
-        **_simulated(capacities[0], state.geometry),
-        "measured": measured,
-        "compared": comparison,
-        **held_runs_left_out(len(chosen_life(state, at_cycles=at_cycles).held)),
-    }
+    held_count = len(chosen_life(state, at_cycles=at_cycles).held)
+    profile, drive = PressureProfile(), Drive()  # those of the life test
+    trace = engage(capacities[0], state.geometry.mean_radius, profile=profile, drive=drive)
+    return EngagementOut(
+        clutch_id=clutch_id,
+        origin=state.record.origin,
+        simulated=True,
+        at_cycles=whole(cycles),
+        model=assumptions.model.name,
+        initial_speed_rpm=drive.speed / RADIANS_PER_SECOND_PER_RPM,
+        maximum_pressure_bar=profile.maximum / PASCALS_PER_BAR,
+        motor_torque_limit_nm=drive.limit,
+        engaged=trace.duration is not None,
+        duration_s=trace.duration,
+        energy_kj=trace.energy / 1000,
+        channels=EngagementChannels(**_course(trace), motor_torque_nm=trace.motor_torque.round(6).tolist()),
+        measured=[*measured],
+        compared=comparison,
+        held_runs=held_count,
+        warnings=held_runs_left_out(held_count),
+    )
 
 
-def _simulated(capacity: Capacity, geometry: Geometry) -> dict[str, Any]:
-    """The life test's engagement in the public shape."""
-    profile, drive = PressureProfile(), Drive()
-    trace = engage(capacity, geometry.mean_radius, profile=profile, drive=drive)
-    return {
-        "initial_speed_rpm": drive.speed / RADIANS_PER_SECOND_PER_RPM,
-        "maximum_pressure_bar": profile.maximum / PASCALS_PER_BAR,
-        "motor_torque_limit_nm": drive.limit,
-        "engaged": trace.duration is not None,
-        "duration_s": trace.duration,
-        "energy_kj": trace.energy / 1000,
-        "channels": _course(trace) | {"motor_torque_nm": trace.motor_torque.round(6).tolist()},
-    }
-
-
-def _compared_row(measured: Sequence[dict[str, Any]], life: Life, run_id: str | None) -> dict[str, Any] | None:
+def _compared_row(measured: Sequence[MeasuredEngagement], life: Life, run_id: str | None) -> MeasuredEngagement | None:
     run_ids = {event.run_id for event in life.events}
-    rows = [row for row in measured if row["run_id"] in run_ids]
+    rows = [row for row in measured if row.run_id in run_ids]
     if run_id is None:
         return rows[-1] if rows else None
-    row = next((row for row in rows if row["run_id"] == run_id), None)
+    row = next((row for row in rows if row.run_id == run_id), None)
     if row is None:
         raise NotFoundError(f"run {run_id!r} is no evaluated engagement of this life up to these cycles")
     return row
 
 
-def _comparison(run: IncomingRun, row: dict[str, Any], capacity: Capacity, geometry: Geometry) -> dict[str, Any] | None:
+def _comparison(
+    run: IncomingRun, row: MeasuredEngagement, capacity: Capacity, geometry: Geometry
+) -> ComparedEngagement | None:
     """A measured engagement beside the model's; the model's part is null where the record does not show its drive."""
     engagement = evaluated(run, geometry)
     if not isinstance(engagement, EngagementIndicators):
@@ -97,26 +101,26 @@ def _comparison(run: IncomingRun, row: dict[str, Any], capacity: Capacity, geome
     columns = {"pressure_bar": slip.pressure, "speed_rpm": slip.speed, "torque_nm": slip.torque}
     means = {name: bin_means(slip.time, column, at) for name, column in columns.items()}
     differences = discrepancy(engagement, capacity, geometry.mean_radius)
-    return {
-        "run_id": row["run_id"],
-        "cycles": row["cycles"],
-        "channels": public_channels({"time_s": at - slip.contact} | means),
-        "model": None if differences is None else _model_part(differences, slip.contact),
-    }
+    return ComparedEngagement(
+        run_id=row.run_id,
+        cycles=row.cycles,
+        channels=EngagementTrace(**public_channels({"time_s": at - slip.contact} | means)),
+        model=None if differences is None else _model_part(differences, slip.contact),
+    )
 
 
-def _model_part(found: EngagementDiscrepancy, contact: float) -> dict[str, Any]:
+def _model_part(found: EngagementDiscrepancy, contact: float) -> ModelledEngagement:
     """The model's engagement from the measured one's conditions, and how far the measured one is from it."""
     difference = found.stop_time_difference
-    return {
-        "channels": _course(found.trace, contact),
-        "inertia_kg_m2": found.drive.inertia,
-        "motor_torque_limit_nm": found.drive.limit,
-        "stop_time_s": found.simulated_stop_time,
-        "torque_discrepancy": found.torque_share,
-        "stop_time_difference_s": None if difference is None else difference.value,
-        "stop_time_difference_sd_s": None if difference is None else difference.sd,
-    }
+    return ModelledEngagement(
+        channels=EngagementTrace(**_course(found.trace, contact)),
+        inertia_kg_m2=found.drive.inertia,
+        motor_torque_limit_nm=found.drive.limit,
+        stop_time_s=found.simulated_stop_time,
+        torque_discrepancy=found.torque_share,
+        stop_time_difference_s=None if difference is None else difference.value,
+        stop_time_difference_sd_s=None if difference is None else difference.sd,
+    )
 
 
 def _parameters(

@@ -1,8 +1,7 @@
 """`/v1/fleet/priors`: the newest version of every fleet's prior."""
 
 import math
-from collections.abc import Iterator, Mapping
-from typing import Any
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -10,8 +9,10 @@ from models.degradation.severity import SeverityBasis
 from models.prognosis.criteria import FEWEST_SEVERITIES
 from models.prognosis.ended_lives import ObservedLife, severity_exponent
 from models.prognosis.fleet import FleetPrior
-from service.api.base import schema_fields
-from service.api.fleet import FleetPriorOut
+from service.api.base import of_row
+from service.api.fleet import Factor, FleetPriorOut, FleetPriorPage, Population, SeverityEstimate, Share
+from service.paging import Part
+from service.tables import Cells, cells
 from storage import assumptions
 from storage.assumptions import FleetPriorRow
 from storage.engine.database import Database
@@ -21,26 +22,33 @@ _OWN = ("version", "created_at", "clutches", "ended_lives", "censored_lives")
 COLUMNS = (*_KINDS, "severity", *_OWN)
 
 
-def newest(database: Database) -> list[dict[str, Any]]:
+def page(database: Database, part: Part) -> FleetPriorPage:
+    """The newest version of every prior."""
     with database.reading() as connection:
-        return [_item(row) for row in assumptions.current_fleet_priors(connection)]
+        priors = part.sliced([_item(row) for row in assumptions.current_fleet_priors(connection)])
+    return FleetPriorPage(items=[*priors.items], next=priors.next)
 
 
-def rows(payload: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
-    for item in payload["items"]:
+def rows(page: FleetPriorPage) -> Iterator[Cells]:
+    """Priors as rows of a table."""
+    for item in page.items:
+        population: dict[str, Share | Factor] = dict(item.population)
         yield (
-            {name: item["kind"][name] for name in _KINDS}
-            | {"severity": item["kind"]["severity"]["basis"]}
-            | {name: item[name] for name in _OWN}
-            | {"severity_exponent": (item["severity_exponent"] or {}).get("value")}
-            | {f"{name}_median": spread["median"] for name, spread in item["population"].items()}
-            | {f"{name}_sd": spread.get("sd", spread.get("log_sd")) for name, spread in item["population"].items()}
+            cells(item.kind, _KINDS)
+            | {"severity": item.kind.severity.basis}
+            | cells(item, _OWN)
+            | {"severity_exponent": None if item.severity_exponent is None else item.severity_exponent.value}
+            | {f"{name}_median": spread.median for name, spread in population.items()}
+            | {
+                f"{name}_sd": spread.sd if isinstance(spread, Share) else spread.log_sd
+                for name, spread in population.items()
+            }
         )
 
 
-def _item(row: FleetPriorRow) -> dict[str, Any]:
+def _item(row: FleetPriorRow) -> FleetPriorOut:
     """A prior as it goes out: medians, and the factor or share by which two thirds of the clutches stay within."""
-    return schema_fields(
+    return of_row(
         FleetPriorOut,
         row,
         kind=row.fleet,
@@ -53,7 +61,7 @@ def _item(row: FleetPriorRow) -> dict[str, Any]:
     )
 
 
-def _severity_exponent(row: FleetPriorRow) -> dict[str, float] | None:
+def _severity_exponent(row: FleetPriorRow) -> SeverityEstimate | None:
     """The exponent q of life ∝ energy^-q by ended lives, with its deviation; None if they do not determine it."""
     lives = [ObservedLife.from_dict(stored) for stored in row.content.get("ended", ())]
     by_energy = [(life.end, life.energy) for life in lives if life.energy]
@@ -63,15 +71,11 @@ def _severity_exponent(row: FleetPriorRow) -> dict[str, float] | None:
     severity = row.fleet["severity"]
     # ends are in cycles that are weighted by energy to this power already: the fit gives what is missing to q
     already_counted = severity["exponent"] if severity["basis"] == SeverityBasis.DISSIPATED_ENERGY else 0.0
-    return {"value": value + already_counted, "sd": deviation}
+    return SeverityEstimate(value=value + already_counted, sd=deviation)
 
 
-def _population(prior: FleetPrior) -> Mapping[str, Any]:
-    population: dict[str, Any] = {}
-    for index, name in enumerate(("change", "scale_cycles", "exponent", "scatter")):
-        middle, deviation = float(prior.mean[index]), math.sqrt(prior.scale[index, index])
-        if name == "change":
-            population[name] = {"median": middle, "sd": deviation}
-        else:
-            population[name] = {"median": math.exp(middle), "log_sd": deviation}
-    return population
+def _population(prior: FleetPrior) -> Population:
+    change, *others = zip(prior.mean.tolist(), np.sqrt(np.diag(prior.scale)).tolist(), strict=False)
+    scale_cycles, exponent, scatter = (Factor(median=math.exp(middle), log_sd=sd) for middle, sd in others[:3])
+    share = Share(median=change[0], sd=change[1])
+    return Population(change=share, scale_cycles=scale_cycles, exponent=exponent, scatter=scatter)

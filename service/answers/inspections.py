@@ -1,14 +1,15 @@
 """`/inspections`: what was found on a clutch's friction surface, by cycles, and the files of its photographs."""
 
 import hashlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 from service import repository
+from service.api.inspection import InspectionOut, InspectionPage
 from service.errors import NotFoundError
 from service.paging import Part, by_cycles
 from service.repository import inspection, inspection_answers
+from service.tables import Cells, cells
 from storage import inspections
 from storage.engine.database import Database
 from storage.engine.errors import DamagedData
@@ -20,21 +21,22 @@ COLUMNS = (
 )  # fmt: skip
 
 
-def page(database: Database, clutch_id: str, part: Part) -> dict[str, Any]:
+def page(database: Database, clutch_id: str, part: Part) -> InspectionPage:
     """Inspections by cycles. Raises NotFoundError."""
     with database.reading() as connection:
         repository.clutch(connection, clutch_id)
         rows = inspections.page(connection, clutch_id, limit=part.most, after=part.after)
-        items = {item["inspection_id"]: item for item in inspection_answers(connection, rows)}
-    return part.of(rows, by_cycles("inspection_id"), lambda row: items[row.inspection_id])
+        items = {item.inspection_id: item for item in inspection_answers(connection, rows)}
+    return part.of(InspectionPage, rows, by_cycles("inspection_id"), lambda row: items[row.inspection_id])
 
 
-def rows(payload: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
-    for item in payload["items"]:
-        yield {name: item[name] for name in COLUMNS} | {"photographs": len(item["photographs"])}
+def rows(page: InspectionPage) -> Iterator[Cells]:
+    """Inspections as rows of a table, with the number of photographs."""
+    for item in page.items:
+        yield cells(item, COLUMNS) | {"photographs": len(item.photographs)}
 
 
-def look_up(database: Database, clutch_id: str, inspection_id: str) -> dict[str, Any]:
+def look_up(database: Database, clutch_id: str, inspection_id: str) -> InspectionOut:
     """One inspection. Raises NotFoundError."""
     with database.reading() as connection:
         repository.clutch(connection, clutch_id)

@@ -1,10 +1,9 @@
 """`/v1/jobs`: what waits, runs and has ended, as it is answered."""
 
 from collections.abc import Collection
-from typing import Any
 
-from service.api.base import schema_fields
-from service.api.diagnosis import JobOut
+from service.api.base import of_row
+from service.api.diagnosis import JobOut, JobPage
 from service.errors import found
 from service.paging import Part, by_key
 from storage import jobs
@@ -18,14 +17,15 @@ def find(database: Database, job_id: str, *, only: Collection[str] | None) -> Jo
         return found(jobs.get(connection, job_id), "job", job_id, only=only)
 
 
-def page(database: Database, part: Part, *, state: str | None, only: Collection[str] | None) -> dict[str, Any]:
+def page(database: Database, part: Part, *, state: str | None, only: Collection[str] | None) -> JobPage:
     """Jobs in that state, of `only` these clutches, newest first."""
     with database.reading() as connection:
         rows = jobs.page(connection, limit=part.most, before=part.number, state=state, only=only)
-    return part.of(rows, by_key("job_key"), shown)
+    return part.of(JobPage, rows, by_key("job_key"), shown)
 
 
-def shown(row: JobRow) -> dict[str, Any]:
+def shown(row: JobRow) -> JobOut:
+    """A job with its progress and, once it has ended, its result."""
     progress = dict(row.progress or {})
     result = progress.pop("result", None)
-    return schema_fields(JobOut, row, progress=None if row.progress is None else progress, result=result)
+    return of_row(JobOut, row, progress=None if row.progress is None else progress, result=result)

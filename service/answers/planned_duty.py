@@ -5,8 +5,7 @@ cycles lead there. An adopted model's course over ζ is that of recent duty.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 from scipy.special import ndtri
@@ -27,10 +26,10 @@ from models.prognosis.criteria import HORIZON, QUANTILES
 from models.prognosis.first_passage import PassageStatus, horizon_at, weighted_quantiles
 from models.prognosis.stated_end import StatedEnd
 from service import repository
-from service.api.life import PlannedBlock, ProgrammeIn
+from service.api.life import LifePrediction, PlannedBlock, PlannedLife, ProgrammeIn, Quantiles
 from service.channels import PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM
 from service.clutch.condition import with_held_runs
-from service.clutch.items import ENDED, INSUFFICIENT, SAFE, by_quantile, ended, notice_items
+from service.clutch.items import ENDED, INSUFFICIENT, SAFE, by_quantile, ended, warned
 from service.clutch.recomputation import ClutchHistory
 from service.clutch.timeline import Event, Series, date_of, moment_at, pace_of
 from service.clutch.tracking import advance, drawn, end_of_life, predict, predict_at, step_rng
@@ -46,7 +45,7 @@ _NORMALS = ndtri((np.arange(_PLANS) + 0.5) / _PLANS)
 Blocks = Sequence[PlannedBlock]
 
 
-def planned_life(database: Database, clutch_id: str, method: str, planned: ProgrammeIn) -> dict[str, Any]:
+def planned_life(database: Database, clutch_id: str, method: str, planned: ProgrammeIn) -> PlannedLife:
     """The remaining useful life of the present life under a programme, by one filter. Raises NotFoundError."""
     with database.reading() as connection:
         state = repository.state(connection, clutch_id, carried=True)
@@ -54,67 +53,81 @@ def planned_life(database: Database, clutch_id: str, method: str, planned: Progr
     stated = planned.pace_cycles_per_hour
     of_runs = pace_of(events)
     pace = stated or (None if of_runs is None else of_runs * _SECONDS_PER_HOUR)
-    prediction = _prediction(state, method, planned)
-    prediction_with_held = None
+    prediction, plan = _prediction(state, method, planned)
+    among = None
     if state.held:
         evidence = repository.evidence_for(database, state, repository.run_reader(database, clutch_id))
-        prediction_with_held = None if evidence is None else _prediction(with_held(state, evidence), method, planned)
-    summary: dict[str, Any] = {}
+        among = None if evidence is None else _prediction(with_held(state, evidence), method, planned)[0].model_dump()
+    summary = {}
     if pace is not None and events:
         a_second = pace / _SECONDS_PER_HOUR
         summary["pace"] = {"cycles_per_second": a_second, "moment": moment_at(events, a_second, events[-1].cycles)}
-    return prediction | {
-        "clutch_id": clutch_id,
-        "method": method,
-        "revision": state.revision,
-        "origin": state.record.origin,
-        "end_of_life_at": _dates(prediction["end_of_life_cycles"], events, pace),
-        "pace_cycles_per_hour": pace,
-        "pace_from": None if pace is None else "runs" if stated is None else "request",
-        **with_held_runs(prediction, summary, prediction_with_held, len(state.held)),
-    }
+    beside = with_held_runs(prediction.model_dump(), summary, among, len(state.held))
+    head = {"clutch_id": clutch_id, "method": method, "revision": state.revision, "origin": state.record.origin}
+    return PlannedLife(
+        **{**head, **dict(prediction), **beside.of(prediction), **asdict(plan)},
+        end_of_life_at=_dates(prediction.end_of_life_cycles, events, pace),
+        pace_cycles_per_hour=pace,
+        pace_from=None if pace is None else "runs" if stated is None else "request",
+    )
 
 
-def _prediction(state: ClutchHistory, method: str, planned: ProgrammeIn) -> dict[str, Any]:
-    """The prediction under recent duty, and in its place what the programme makes of it."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Plan:
+    """What is stated of a programme: the remaining cycles were recent duty to go on, the blocks until the end, how severe a
+    cycle of each block is, and what a planned cycle was counted by."""
+
+    recent_duty_cycles: Quantiles
+    remaining_blocks: Quantiles
+    block_severity: Sequence[float | None]
+    counted_by: str
+
+
+def _prediction(state: ClutchHistory, method: str, planned: ProgrammeIn) -> tuple[LifePrediction, _Plan]:
+    """The prediction under recent duty, or in its place what the programme makes of it; and what is stated of that."""
     assumptions, fraction = state.assumptions(), state.fraction
     series = state.lives[-1].pooled(assumptions) if state.events else None
     basis = assumptions.severity.basis.value
-    unknown = {
-        "remaining_blocks": by_quantile({}),
-        "block_severity": [None] * len(planned.programme),
-        "counted_by": basis,
-    }
+    unknown = _Plan(
+        recent_duty_cycles=by_quantile({}),
+        remaining_blocks=by_quantile({}),
+        block_severity=[None] * len(planned.programme),
+        counted_by=basis,
+    )
     if series is None or not series.measurements:
-        recent = predict_at(state.events, assumptions, fraction, method=method)
-        return recent | {"recent_duty_cycles": by_quantile({})} | unknown
+        return predict_at(state.events, assumptions, fraction, method=method), unknown
     life, runs = state.lives[-1], len(series.measurements)
     now = life.events[-1].cycles
     tracked = advance(method, series, (state.filters or {}).get(method), runs)
     sample = drawn(method, series, tracked)
     tracked = replace(tracked, sample=sample)
     recent = ended(predict(method, series, tracked, now, fraction, tests=life.tests), life.end)
-    recent["recent_duty_cycles"] = recent["remaining_cycles"]
-    if recent["status"] in (INSUFFICIENT, ENDED):
-        return recent | unknown
+    unknown = replace(unknown, recent_duty_cycles=recent.remaining_cycles)
+    if recent.status in (INSUFFICIENT, ENDED):
+        return recent, unknown
     duty = _counted(state, assumptions.severity, series, planned)
     rng = step_rng(f"{method}-programme", series, runs)
-    programme = duty.programme(planned.programme, recent["current"]["mean_cof"], rng)
+    programme = duty.programme(planned.programme, recent.current.mean_cof or 0.0, rng)
     most = series.scale.origin + horizon_at(now - series.scale.origin) - now
     horizon = float(series.scale.progress(now)) + most * float(programme.rates.max())
     end = end_of_life(sample, series, tracked, now, fraction, horizon)
-    answer = _planned_answer(programme, end, series, now=now, most=most)
-    if recent["status"] != PassageStatus.REACHED:
-        open_ended = None in answer["remaining_cycles"].values()
-        recent["status"] = (PassageStatus.MAY_NEVER_REACH if open_ended else PassageStatus.PREDICTED).value
-    recent["warnings"] = recent["warnings"] + notice_items(duty.notices(planned.programme))
-    return recent | answer | {"counted_by": duty.severity.basis.value}
+    planned_end, blocks = _planned_end(recent, programme, end, series, now=now, most=most)
+    notices = warned(duty.notices(planned.programme))
+    rates = programme.rates / series.scale.severity.rate
+    plan = _Plan(
+        recent_duty_cycles=recent.remaining_cycles,
+        remaining_blocks=blocks,
+        block_severity=[float(median) for median in np.median(rates, axis=0)],
+        counted_by=duty.severity.basis.value,
+    )
+    return planned_end.model_copy(update={"warnings": recent.warnings + notices}), plan
 
 
-def _planned_answer(
-    programme: DutyProgramme, end: StatedEnd, series: Series, *, now: float, most: float
-) -> dict[str, Any]:
-    """When the life ends: as it was where that is past, else after as many cycles as ζ takes to get there, up to `most`."""
+def _planned_end(
+    recent: LifePrediction, programme: DutyProgramme, end: StatedEnd, series: Series, *, now: float, most: float
+) -> tuple[LifePrediction, Quantiles]:
+    """When the life ends: as it was where that is past, else after as many cycles as ζ takes to get there, up to `most`; and
+    the blocks until then."""
     draws = np.arange(end.ends.size) % programme.rates.shape[0]
     ahead = end.ends - float(series.scale.progress(now))
     spread = DutyProgramme(cycles=programme.cycles, rates=programme.rates[draws])
@@ -123,17 +136,16 @@ def _planned_answer(
     stated = weighted_quantiles(np.minimum(left, 10.0 * (most + HORIZON)), end.weight, QUANTILES).tolist()
     ends = {q: x if x <= most else None for q, x in zip(QUANTILES, stated, strict=True)}
     remaining = {q: None if x is None else max(x, 0.0) for q, x in ends.items()}
-    rates = programme.rates / series.scale.severity.rate
-    return {
+    open_ended = PassageStatus.MAY_NEVER_REACH if None in remaining.values() else PassageStatus.PREDICTED
+    known = {
+        "status": recent.status if recent.status == PassageStatus.REACHED.value else open_ended.value,
         "remaining_cycles": by_quantile(remaining),
         "end_of_life_cycles": by_quantile({q: None if x is None else now + x for q, x in ends.items()}),
-        "remaining_blocks": by_quantile(
-            {q: None if x is None else programme.blocks_in(x) for q, x in remaining.items()}
-        ),
-        "block_severity": [float(median) for median in np.median(rates, axis=0)],
         "at_least": most if remaining[SAFE] is None else remaining[SAFE],
         "probability_of_reaching": min(1.0, float(end.weight @ (left <= most))),
     }
+    blocks = by_quantile({q: None if x is None else programme.blocks_in(x) for q, x in remaining.items()})
+    return recent.model_copy(update=known), blocks
 
 
 def _counted(state: ClutchHistory, severity: Severity, series: Series, planned: ProgrammeIn) -> "_Counted":

@@ -7,17 +7,18 @@ in memory, so that it may be made in another process than the one that answers.
 import gzip
 import hashlib
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import IO, Any, BinaryIO, Literal
+from typing import IO, BinaryIO, Literal
 
 from pydantic_core import to_json
 
 from models.arrays import FloatArray
 from models.records.decimation import extreme_rows
 from service import repository
+from service.api.run import Change, RunDescription
 from service.channels import CHANNELS
 from service.errors import NotAcceptableError, NotFoundError
 from storage import changes, raw_columns
@@ -37,11 +38,9 @@ _PACKAGE, _EXTRA = "pyarrow", "parquet"
 Values = Callable[[str], FloatArray]
 
 
-def write_json(
-    file: IO[bytes] | gzip.GzipFile, head: Mapping[str, Any], names: tuple[str, ...], values: Values
-) -> None:
+def write_json(file: IO[bytes] | gzip.GzipFile, head: RunDescription, names: tuple[str, ...], values: Values) -> None:
     """`head` as JSON with `channels` as its last field, numbers such that the same doubles are read from them."""
-    file.write(to_text(head).encode()[:-1] + b',"channels":{')
+    file.write(to_text(repository.json_of(head)).encode()[:-1] + b',"channels":{')
     for index, name in enumerate(names):
         file.write((b"," if index else b"") + to_text(name).encode() + b":[")
         column = values(name)
@@ -60,7 +59,7 @@ def parquet_writer() -> str:
         raise NotAcceptableError(message) from None
 
 
-def write_parquet(path: Path, head: Mapping[str, Any], names: tuple[str, ...], values: Values) -> None:
+def write_parquet(path: Path, head: RunDescription, names: tuple[str, ...], values: Values) -> None:
     """A column a channel with its unit under `unit` of the field's metadata, and `head` as JSON under `clutchlife`."""
     parquet_writer()
     import pyarrow as arrow  # type: ignore[import-untyped]  # start-up time, optional package
@@ -69,7 +68,7 @@ def write_parquet(path: Path, head: Mapping[str, Any], names: tuple[str, ...], v
     fields = [
         arrow.field(name, arrow.float64(), nullable=False, metadata={"unit": CHANNELS[name].unit}) for name in names
     ]
-    schema = arrow.schema(fields, metadata={"clutchlife": json.dumps(head, allow_nan=False)})
+    schema = arrow.schema(fields, metadata={"clutchlife": json.dumps(repository.json_of(head), allow_nan=False)})
     table = arrow.table([arrow.array(values(name)) for name in names], schema=schema)
     parquet.write_table(table, path, row_group_size=_ROW_GROUP, use_dictionary=False, compression="zstd")
 
@@ -95,10 +94,10 @@ def entity_tag(
     return _tag(head, points, kind, compressed)
 
 
-def _tag(head: Mapping[str, Any], points: int | None, kind: Kind, compressed: bool) -> str:
+def _tag(head: RunDescription, points: int | None, kind: Kind, compressed: bool) -> str:
     """The hashes in the receipt and, where its file was read again, in the audit trail stand for the channels."""
     writer = parquet_writer() if kind == "parquet" else "json"
-    content = to_text([_FORM, head, points, writer, compressed])
+    content = to_text([_FORM, repository.json_of(head), points, writer, compressed])
     return f'"{hashlib.sha256(content.encode()).hexdigest()[:32]}"'
 
 
@@ -124,7 +123,7 @@ def write_run(
         write_parquet(path, head, names, values)
     else:
         with path.open("wb") as file, _packed(file) if compressed else file as body:
-            write_json(body, head, names, _thinned(values, names, head["samples"], points))
+            write_json(body, head, names, _thinned(values, names, head.samples, points))
     return _tag(head, points, kind, compressed)
 
 
@@ -155,17 +154,18 @@ def _packed(file: BinaryIO) -> gzip.GzipFile:
     return gzip.GzipFile(filename="", mode="wb", compresslevel=_LEVEL, fileobj=file, mtime=0)
 
 
-def _look_up(database: Database, clutch_id: str, run_id: str) -> tuple[int, dict[str, Any], tuple[str, ...]]:
+def _look_up(database: Database, clutch_id: str, run_id: str) -> tuple[int, RunDescription, tuple[str, ...]]:
     """A stored run before its channels are read: its key, what is said of it, and the names of its channels."""
     with database.reading() as connection:
         row = repository.run(connection, clutch_id, run_id)
         lengths = raw_columns.lengths(connection, row.run_key)
         trail = changes.page(connection, clutch_id, run_id=run_id)
-    head = repository.receipt(row) | {
-        "reading": row.details.get("file", {}).get("reading"),
-        "changes": [change.entry() for change in trail],
-        "samples": max(lengths.values(), default=0),
-    }
+    head = RunDescription(
+        **dict(repository.receipt(row)),
+        reading=row.details.get("file", {}).get("reading"),
+        changes=[Change(**change.entry()) for change in trail],
+        samples=max(lengths.values(), default=0),
+    )
     return row.run_key, head, tuple(lengths)
 
 

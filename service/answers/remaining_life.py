@@ -11,10 +11,11 @@ from sqlalchemy import Connection
 
 from service import repository
 from service.api.clutch import EndOfLifeIn
-from service.api.life import CriterionIn
+from service.api.life import CriterionIn, CriterionOutcome, CriterionValue, LifePrediction, RemainingLife
+from service.api.run import Warned
 from service.clutch.assumptions import ALL_PRESSURES, MEAN_COF
 from service.clutch.condition import with_held_runs
-from service.clutch.items import ended, notice_items
+from service.clutch.items import ended, warned
 from service.clutch.notices import filters_disagree
 from service.clutch.quantities.ends import GIVEN, criteria_answer, criterion_end
 from service.clutch.quantities.measured import (
@@ -29,6 +30,7 @@ from service.clutch.recomputation import ClutchHistory
 from service.clutch.tracking import CARRIED, predict_at
 from service.clutch.with_held import ClutchMeasurements, measured_life, with_held
 from service.errors import NotFoundError, unknown_clutch
+from service.tables import Cells, cells
 from storage import clutches, results
 from storage.engine.database import Database
 
@@ -47,7 +49,7 @@ def criteria_of(database: Database, clutch_id: str) -> bytes:
 
 def remaining_life(
     database: Database, clutch_id: str, method: str, pressure_bar: float | None, at_cycles: float | None
-) -> dict[str, Any]:
+) -> RemainingLife:
     """The remaining useful life as it is now, or as it would have been predicted at `at_cycles`.
 
     The carried filters' predictions over all pressures are stored; those of the exact filter and at one pressure are
@@ -65,7 +67,6 @@ def remaining_life(
         now = at_cycles is None or at_cycles >= row.summary.get("as_of_cycles", math.inf)
         earlier = not now and bool(row.summary.get("held"))
         state = repository.state(connection, clutch_id, carried=carried_on) if stored is None or earlier else None
-    head = {"clutch_id": clutch_id, "method": method, "revision": row.revision, "origin": row.record["origin"]}
     summary, count = row.summary if now else {}, row.summary.get("held", 0)
     outlook_with_held = (summary.get("with_held") or {}).get(method)
     if state is not None:
@@ -74,27 +75,29 @@ def remaining_life(
             _with_held(database, state, method, pressure_bar, None if now else at_cycles) if count else None
         )
     if stored is not None:
-        payload = stored.payload
+        prediction = repository.prediction(stored)
     elif state is None:
         raise AssertionError("a prediction is stored, or the state was loaded")
     else:
-        payload = _predicted(state, method, pressure_bar, at_cycles)
-    payload = {**payload, "warnings": [*payload["warnings"], *disagree]}
-    answer = head | payload | with_held_runs(payload, summary, outlook_with_held, count)
-    return answer | {"criteria": _criteria(payload)}
+        prediction = _predicted(state, method, pressure_bar, at_cycles)
+    prediction = prediction.model_copy(update={"warnings": [*prediction.warnings, *disagree]})
+    beside = with_held_runs(prediction.model_dump(), summary, outlook_with_held, count)
+    head = {"clutch_id": clutch_id, "method": method, "revision": row.revision, "origin": row.record["origin"]}
+    return RemainingLife(**{**head, **dict(prediction), **beside.of(prediction)}, criteria=_criteria(prediction))
 
 
-def _disagreement(connection: Connection, clutch_id: str, at_cycles: float | None) -> list[dict[str, Any]]:
+def _disagreement(connection: Connection, clutch_id: str, at_cycles: float | None) -> list[Warned]:
     """The warning where the filters that are carried along a life disagree about the remaining life by mean COF."""
     stored = {
         method: results.prediction_at(connection, clutch_id, method, ALL_PRESSURES, at_cycles) for method in CARRIED
     }
-    return notice_items(filters_disagree({method: row.payload for method, row in stored.items() if row is not None}))
+    predictions = {method: repository.prediction(row) for method, row in stored.items() if row is not None}
+    return warned(filters_disagree(predictions))
 
 
 def _predicted(
     state: ClutchHistory, method: str, pressure_bar: float | None, at_cycles: float | None
-) -> dict[str, Any]:
+) -> LifePrediction:
     carried = (state.filters or {}).get(CARRIED[0])
     return predict_at(
         state.events,
@@ -109,39 +112,43 @@ def _predicted(
 
 def _with_held(
     database: Database, state: ClutchHistory, method: str, pressure_bar: float | None, at_cycles: float | None
-) -> dict[str, Any]:
+) -> Mapping[str, Any]:
     """Compute the prediction that counts the held runs too."""
     evidence = repository.evidence_for(database, state, repository.run_reader(database, state.clutch_id))
     if evidence is None:
         raise AssertionError("runs are held: the evidence was loaded")
-    return _predicted(with_held(state, evidence), method, pressure_bar, at_cycles)
+    return _predicted(with_held(state, evidence), method, pressure_bar, at_cycles).model_dump()
 
 
-def _criteria(payload: Mapping[str, Any]) -> list[dict[str, Any]]:
+def _criteria(prediction: LifePrediction) -> list[CriterionOutcome]:
     """The one criterion of a stored prediction, as `criteria` lists it: mean COF, which is surely the first."""
-    criterion, current = payload["criterion"], payload["current"]
-    fields = {name: criterion.get(name) for name in GIVEN}
+    criterion, current = prediction.criterion, prediction.current
     return [
-        fields
-        | {"initial": criterion["initial_mean_cof"], "limit": criterion["threshold_mean_cof"]}
-        | {name: payload[name] for name in ("end_of_life_cycles", "remaining_cycles", "probability_of_reaching")}
-        | {"current": {"value": current["mean_cof"], "sd": current["mean_cof_sd"]}}
-        | {"probability_first": 1.0, "tests": payload["runs_used"]}
+        CriterionOutcome(
+            **{name: getattr(criterion, name) for name in GIVEN},
+            initial=criterion.initial_mean_cof,
+            limit=criterion.threshold_mean_cof,
+            end_of_life_cycles=prediction.end_of_life_cycles,
+            remaining_cycles=prediction.remaining_cycles,
+            probability_of_reaching=prediction.probability_of_reaching,
+            current=CriterionValue(value=current.mean_cof, sd=current.mean_cof_sd),
+            probability_first=1.0,
+            tests=prediction.runs_used,
+        )
     ]
 
 
-def rows(payload: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
-    held_runs = payload["held_runs"]
-    for quantile, remaining in payload["remaining_cycles"].items():
-        yield {
-            "as_of_cycles": payload["as_of_cycles"],
-            "status": payload["status"],
+def rows(answer: RemainingLife) -> Iterator[Cells]:
+    """Quantiles of the remaining life as rows of a table."""
+    held_runs = answer.held_runs
+    for quantile, remaining in answer.remaining_cycles.items():
+        yield cells(answer, ("as_of_cycles", "status")) | {
             "quantile": quantile,
             "remaining_cycles": remaining,
-            "end_of_life_cycles": payload["end_of_life_cycles"][quantile],
-            "at_least": payload["at_least"],
-            "held_runs": 0 if held_runs is None else held_runs["count"],
-            "remaining_cycles_with_held": None if held_runs is None else held_runs["remaining_cycles"][quantile],
+            "end_of_life_cycles": answer.end_of_life_cycles[quantile],
+            "at_least": answer.at_least,
+            "held_runs": 0 if held_runs is None else held_runs.count,
+            "remaining_cycles_with_held": None if held_runs is None else held_runs.remaining_cycles[quantile],
         }
 
 
@@ -152,7 +159,7 @@ COLUMNS = (
 
 
 #: What is said of mean COF's course and of its forecasts, where another quantity is asked for.
-_NOT_OF_MEAN_COF: dict[str, Any] = {"course": None, "back_cast": None, "ended_lives": 0, "sample": None}
+_NOT_OF_MEAN_COF = {"course": None, "back_cast": None, "ended_lives": 0, "sample": None}
 
 
 def life_by_criteria(
@@ -164,7 +171,7 @@ def life_by_criteria(
     quantity: str | None = None,
     criterion: str | None = None,
     life: int | None = None,
-) -> dict[str, Any]:
+) -> RemainingLife:
     """The remaining life by a clutch's criteria, by those of one `criterion`'s quantity, or by one `quantity` at a pressure.
 
     As it was at `at_cycles`, of the present life or of an earlier one by its number. Raises NotFoundError, and InvalidError
@@ -180,17 +187,18 @@ def life_by_criteria(
         _by_criteria, method=method, quantity=quantity, criterion=criterion, pressure_bar=pressure_bar
     )
     chosen = chosen_life(state, life, at_cycles)
-    answer = by_criteria(state, chosen, evidence)
-    answer["warnings"] = [*answer["warnings"], *disagree]
+    prediction, criteria = by_criteria(state, chosen, evidence)
+    prediction = prediction.model_copy(update={"warnings": [*prediction.warnings, *disagree]})
     now = chosen.number == chosen.of and (at_cycles is None or at_cycles >= row.summary.get("as_of_cycles", math.inf))
-    answer_with_held = None
+    among = None
     if chosen.held:
         evidence = replace(evidence, reader=repository.run_reader(database, clutch_id))
         state_with_held = with_held(state, evidence)
         chosen_with_held = chosen_life(state_with_held, life, None if now else at_cycles)
-        answer_with_held = by_criteria(state_with_held, chosen_with_held, evidence)
+        among = by_criteria(state_with_held, chosen_with_held, evidence)[0].model_dump()
+    beside = with_held_runs(prediction.model_dump(), row.summary if now else {}, among, len(chosen.held))
     head = {"clutch_id": clutch_id, "method": method, "revision": row.revision, "origin": state.record.origin}
-    return head | answer | with_held_runs(answer, row.summary if now else {}, answer_with_held, len(chosen.held))
+    return RemainingLife(**{**head, **dict(prediction), **beside.of(prediction)}, life=chosen.item(), criteria=criteria)
 
 
 def _by_criteria(
@@ -202,18 +210,18 @@ def _by_criteria(
     quantity: str | None,
     criterion: str | None,
     pressure_bar: float | None,
-) -> dict[str, Any]:
+) -> tuple[LifePrediction, list[CriterionOutcome]]:
     events = () if chosen.life is None else chosen.life.events
-    by_mean_cof = predict_at(events, chosen.assumptions, state.fraction, method=method)
-    answer = by_mean_cof | {"life": chosen.item(), "criteria": []}
+    prediction = predict_at(events, chosen.assumptions, state.fraction, method=method)
     measured = measured_life(state, chosen, evidence)
     if measured is None:
-        return answer
+        return prediction, []
     requested = _requested_criteria(state.record.end_of_life, measured, quantity, criterion, pressure_bar)
     if all(criterion_in.quantity != MEAN_COF for criterion_in in requested):
-        answer |= _NOT_OF_MEAN_COF
+        prediction = prediction.model_copy(update=_NOT_OF_MEAN_COF)
     ends = [criterion_end(measured, criterion_in, method) for criterion_in in requested]
-    return ended(answer | criteria_answer(measured, ends, answer["current"]), measured.life.end)
+    prediction, criteria = criteria_answer(measured, ends, prediction)
+    return ended(prediction, measured.life.end), criteria
 
 
 def _requested_criteria(
@@ -245,9 +253,9 @@ def _usual(name: str, fraction: float, measured: MeasuredLife, pressure_bar: flo
     if not tracks:
         raise NotFoundError(f"{name} is not measured in this life")
     first = min(tracks, key=lambda series: (series.frequency_hz or 0.0, series.pressure))
-    fields: dict[str, Any] = {"quantity": name, "pressure_bar": pressure_bar}
     if pressure_bar is None and first.pressure != ALL_PRESSURES:
-        fields["pressure_bar"] = first.pressure / 1e5
+        pressure_bar = first.pressure / 1e5
+    place = {"quantity": name, "pressure_bar": pressure_bar}
     if quantity.family is Family.SLOPE:
-        return CriterionIn(**fields, speed_rpm=SLOPE_SPEEDS[1])
-    return CriterionIn(**fields, fraction=fraction, frequency_hz=first.frequency_hz)
+        return CriterionIn.model_validate(place | {"speed_rpm": SLOPE_SPEEDS[1]})
+    return CriterionIn.model_validate(place | {"fraction": fraction, "frequency_hz": first.frequency_hz})

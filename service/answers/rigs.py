@@ -1,9 +1,9 @@
 """`/v1/rigs`: rig profiles in force, by name; `/v1/import/preview`: a file as it would be read and evaluated by one."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
@@ -14,11 +14,12 @@ from models.records.plateaus import cut_plateaus
 from models.records.pressure_levels import pressure_stretches
 from service import repository
 from service.api.clutch import ClutchIn
-from service.api.rig import RigOut, RigProfile
+from service.api.rig import FileKindName, Preview, PreviewColumn, PreviewPiece, RigColumn, RigOut, RigPage, RigProfile
+from service.api.run import Fit, Warned
 from service.channels import CHANNELS, RADIANS_PER_SECOND_PER_RPM, bar
 from service.clutch.analysis import analyse
 from service.clutch.incoming_run import IncomingRun, SampledChannels
-from service.clutch.items import fit_items, notice_items
+from service.clutch.items import fit_items, warned, warnings_of_file
 from service.errors import InvalidError
 from service.paging import Part, by_name
 from service.readers.read_file import preview_file, read_file
@@ -29,21 +30,17 @@ from service.runs.upload import NEEDED, reading_with, run_of
 from storage import clutches, rigs
 from storage.engine.database import Database
 
+_KINDS: Sequence[FileKindName] = get_args(FileKindName)
 #: Samples of each channel that are answered. Chosen: twice the pixels of a plot's width.
 _POINTS = 2000
 
 
-def page(database: Database, part: Part) -> dict[str, Any]:
+def page(database: Database, part: Part) -> RigPage:
     """Profiles by name, fewer where so many would be too much memory."""
     part = replace(part, limit=min(part.limit, rigs.MAX_AT_ONCE))
     with database.reading() as connection:
         rows = rigs.page(connection, limit=part.most, after=part.name)
-    return part.of(rows, by_name("name"), lambda row: repository.rig_out(row).model_dump(mode="json"))
-
-
-def look_up(database: Database, name: str) -> dict[str, Any]:
-    """One profile as it is answered. Raises NotFoundError."""
-    return rig_profile(database, name).model_dump(mode="json")
+    return part.of(RigPage, rows, by_name("name"), repository.rig_out)
 
 
 def rig_profile(database: Database, name: str) -> RigOut:
@@ -59,11 +56,11 @@ def preview(
     filename: str,
     rig: str | None,
     profile: RigProfile | None,
-    kind: str | None,
+    kind: FileKindName | None,
     cycles: float | None,
     clutch_id: str | None,
     reading: Reading,
-) -> dict[str, Any]:
+) -> Preview:
     """What would be made of a file by `profile`, by that of `rig`, or by the one whose columns it has; else by its titles.
     What `reading` says of columns, decimal sign and missing values comes before either.
 
@@ -88,29 +85,29 @@ def preview(
     by_titles = profile is None and shown["problem"] is None  # as a push reads it; else with what is open left open
     read_by = reading_with(None if by_titles else used, reading if by_titles else Reading())
     evaluated = _evaluated(path, filename, None if used is None else read_by, kind, geometry, torque_filter)
-    kind = kind or (evaluated["kinds"][0] if len(evaluated["kinds"]) == 1 else None)
+    kind = kind or (evaluated.kinds[0] if len(evaluated.kinds) == 1 else None)
     usable = _first_of_each(shown["columns"])
     columns = [_column(shown["columns"][index], used) for index in usable]
-    return {
-        "filename": filename,
-        "above": shown["above"],
-        "tables": shown["tables"],
-        "columns": columns,
-        "first_rows": [[row[index] if index < len(row) else "" for index in usable] for row in shown["head"]],
-        "units": {name: spellings(name).split(", ") for name in CHANNELS},
-        "rig": rig,
-        "profile": _saveable([column["title"] for column in columns], used, kind, filename, cycles),
-        "kind": kind,
-        "cycles": cycles,
-        "run_id": from_profile.run_id,
-        **evaluated,
-        "missing": [
-            *evaluated["missing"],
-            *(f"unit of {column['title']}" for column in columns if column["channel"] and not column["unit"]),
-            *(["kind"] if kind is None else []),
-            *(["cycles"] if cycles is None else []),
-        ],
-    }
+    missing = [
+        *evaluated.missing,
+        *(f"unit of {column.title}" for column in columns if column.channel and not column.unit),
+        *(["kind"] if kind is None else []),
+        *(["cycles"] if cycles is None else []),
+    ]
+    return Preview(
+        filename=filename,
+        above=shown["above"],
+        tables=shown["tables"],
+        columns=columns,
+        first_rows=[[row[index] if index < len(row) else "" for index in usable] for row in shown["head"]],
+        units={name: spellings(name).split(", ") for name in CHANNELS},
+        rig=rig,
+        profile=_saveable([column.title for column in columns], used, kind, filename, cycles),
+        kind=kind,
+        cycles=cycles,
+        run_id=from_profile.run_id,
+        **vars(evaluated) | {"missing": missing},
+    )
 
 
 def _clutch(database: Database, clutch_id: str | None) -> tuple[Geometry, float]:
@@ -148,78 +145,97 @@ def _fitting(database: Database, shown: Mapping[str, Any], filename: str) -> tup
 def _by_titles(shown: Mapping[str, Any]) -> RigProfile | None:
     """The columns as their titles name them; None where no title is a channel's. A channel of two columns is left open."""
     channels = [column["channel"] for column in shown["columns"]]
-    columns: dict[str, dict[str, Any]] = {}
+    columns: dict[str, dict[str, object]] = {}
     for column, channel in zip(shown["columns"], channels, strict=True):
         if column["name"]:
             only = channel is not None and channels.count(channel) == 1
-            entry = {"channel": channel, "unit": column["stated"]} if only else {"channel": None}
-            columns.setdefault(_title(column), {"title": _title(column)} | entry)
+            read = {"channel": channel, "unit": column["stated"]} if only else {"channel": None}
+            columns.setdefault(_title(column), {"title": _title(column), **read})
     if not any(column["channel"] for column in columns.values()):
         return None
     return RigProfile.model_validate({"columns": list(columns.values())})
 
 
-def _column(column: Mapping[str, Any], profile: RigProfile | None) -> dict[str, Any]:
+def _column(column: Mapping[str, Any], profile: RigProfile | None) -> PreviewColumn:
     title = _title(column)
     profile_column = next((item for item in profile.columns if item.title == title), None) if profile else None
     channel = None if profile_column is None else profile_column.channel
-    return {
-        "title": title,
-        "stated_unit": column["unit"],
-        "unit": column["read_in"] if channel == column["channel"] else None,
-        "channel": channel,
-        "in_part": channel is not None and column["in_part"],
-        "scale": 1.0 if profile_column is None else profile_column.scale,
-        "offset": 0.0 if profile_column is None else profile_column.offset,
-    }
+    return PreviewColumn(
+        title=title,
+        stated_unit=column["unit"],
+        unit=column["read_in"] if channel == column["channel"] else None,
+        channel=channel,
+        in_part=channel is not None and column["in_part"],
+        scale=1.0 if profile_column is None else profile_column.scale,
+        offset=0.0 if profile_column is None else profile_column.offset,
+    )
 
 
 def _saveable(
-    titles: Sequence[str], used: RigProfile | None, kind: str | None, filename: str, cycles: float | None
-) -> dict[str, Any]:
+    titles: Sequence[str], used: RigProfile | None, kind: FileKindName | None, filename: str, cycles: float | None
+) -> RigProfile:
     """The profile as it could be saved: with all columns, and a pattern of the file's name where the cycles are in that."""
-    profile_columns = {column.title: column.model_dump(mode="json") for column in used.columns} if used else {}
-    profile_fields = {} if used is None else used.model_dump(mode="json")
+    profile_columns = {column.title: RigColumn(**dict(column)) for column in used.columns} if used else {}
+    profile_fields = {} if used is None else dict(used)
     suggested = {
         "file_name": profile_fields.get("file_name") or pattern_for(filename, cycles),
         "kind": profile_fields.get("kind") or kind,
     }
-    columns = [profile_columns.get(title, {"title": title, "channel": None}) for title in titles]
+    columns = [profile_columns.get(title, RigColumn(title=title, channel=None)) for title in titles]
     fields = profile_fields | suggested | {"columns": columns}
-    return {name: value for name, value in fields.items() if name in RigProfile.model_fields}
+    of_profile = {name: value for name, value in fields.items() if name in RigProfile.model_fields}
+    return RigProfile.model_construct(**of_profile)  # not checked: no column need have a channel yet
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Evaluated:
+    """What would be made of a file's channels, as a preview has it; `problem`: why it would be refused."""
+
+    rows: int = 0
+    kinds: list[FileKindName] = field(default_factory=list)
+    missing: list[str] = field(default_factory=list)
+    channels: dict[str, list[float]] = field(default_factory=dict)
+    pieces: list[PreviewPiece] = field(default_factory=list)
+    fits: list[Fit] = field(default_factory=list)
+    warnings: list[Warned] = field(default_factory=list)
+    problem: str | None = None
 
 
 def _evaluated(
-    path: Path, filename: str, reading: Reading | None, kind: str | None, geometry: Geometry, torque_filter: float
-) -> dict[str, Any]:
+    path: Path,
+    filename: str,
+    reading: Reading | None,
+    kind: FileKindName | None,
+    geometry: Geometry,
+    torque_filter: float,
+) -> _Evaluated:
     """The channels, what is cut of them and what is fitted; `problem` says why the file would be refused."""
-    answer: dict[str, Any] = {
-        "rows": 0, "kinds": [], "missing": [], "channels": {}, "pieces": [], "fits": [], "warnings": [], "problem": None,
-    }  # fmt: skip
+    answer = _Evaluated()
     if reading is None:
-        return answer | {"missing": list(NEEDED["stationary_stribeck"])}
+        return replace(answer, missing=list(NEEDED["stationary_stribeck"]))
     try:
         read = read_file(path, filename=filename, reading=reading)
         columns, samples = read.columns, max(column.size for column in read.columns.values())
-        answer |= {
-            "rows": samples,
-            "channels": _drawn(columns, samples),
-            "kinds": [name for name, needed in NEEDED.items() if columns.keys() >= set(needed)],
-            "missing": [name for name in NEEDED[kind or "stationary_stribeck"] if name not in columns],
-            "warnings": notice_items(read.notices),
-        }
-        kind = kind or (answer["kinds"][0] if len(answer["kinds"]) == 1 else None)
-        if kind is None or answer["missing"]:
+        answer = _Evaluated(
+            rows=samples,
+            channels=_drawn(columns, samples),
+            kinds=[name for name in _KINDS if columns.keys() >= set(NEEDED[name])],
+            missing=[name for name in NEEDED[kind or "stationary_stribeck"] if name not in columns],
+            warnings=warned(read.notices),
+        )
+        kind = kind or (answer.kinds[0] if len(answer.kinds) == 1 else None)
+        if kind is None or answer.missing:
             return answer
         run = run_of(read, IncomingRun(kind=kind, cycles=0.0, run_id=""))
         analysis = analyse(run, geometry, torque_filter)
-        return answer | {
-            "pieces": _pieces(run, torque_filter),
-            "fits": fit_items(analysis.fits, {}),
-            "warnings": [*(run.file or {})["warnings"], *notice_items(analysis.warnings)],
-        }
+        return replace(
+            answer,
+            pieces=_pieces(run, torque_filter),
+            fits=fit_items(analysis.fits, {}),
+            warnings=[*warnings_of_file(run), *warned(analysis.warnings)],
+        )
     except InvalidError as error:
-        return answer | {"problem": error.detail}
+        return replace(answer, problem=error.detail)
 
 
 def _drawn(columns: Mapping[str, FloatArray], samples: int) -> dict[str, list[float]]:
@@ -229,7 +245,7 @@ def _drawn(columns: Mapping[str, FloatArray], samples: int) -> dict[str, list[fl
     return {name: column.tolist() for name, column in columns.items()}
 
 
-def _pieces(run: IncomingRun, torque_filter: float) -> list[dict[str, Any]]:
+def _pieces(run: IncomingRun, torque_filter: float) -> list[PreviewPiece]:
     """The plateaus of a sampled stationary test, or the stretches of constant pressure of a dynamic one."""
     if "time_s" not in run.channels:
         return []
@@ -245,5 +261,5 @@ def _pieces(run: IncomingRun, torque_filter: float) -> list[dict[str, Any]]:
     return [_piece(float(time[s.start]), float(time[s.stop - 1]), s.pressure, None) for s in stretches]
 
 
-def _piece(start: float, stop: float, pressure: float, speed: float | None) -> dict[str, Any]:
-    return {"start_s": start, "stop_s": stop, "pressure_bar": bar(pressure), "speed_rpm": speed}
+def _piece(start: float, stop: float, pressure: float, speed: float | None) -> PreviewPiece:
+    return PreviewPiece(start_s=start, stop_s=stop, pressure_bar=bar(pressure), speed_rpm=speed)

@@ -1,13 +1,15 @@
 """`/runs` and `/loops`: receipts by cycles, and the friction loops of the dynamic tests."""
 
-from collections.abc import Iterator, Mapping
-from typing import Any
+from collections.abc import Iterator
 
 from service import repository
+from service.api.over_life import LoopItem, LoopPage
+from service.api.run import ChangePage, Loop, RunPage
 from service.channels import whole
 from service.clutch.condition import held_runs_left_out
 from service.clutch.timeline import DYNAMIC
 from service.paging import Part, by_cycles, by_key, page_as_bytes
+from service.tables import Cells, cells
 from storage import changes, runs
 from storage.encoding import to_text
 from storage.engine.database import Database
@@ -17,6 +19,7 @@ COLUMNS = (
     "sent_cycles",
 )  # fmt: skip
 TRAIL_COLUMNS = changes.SHOWN
+LOOP_COLUMNS = (*Loop.model_fields, "run_id", "cycles")
 
 
 def page_as_json(
@@ -39,33 +42,40 @@ def _as_json(row: runs.ReceiptRow) -> bytes:
     return f"{row.receipt[:-1]},{present}}}".encode()
 
 
-def rows(payload: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
+def rows(page: RunPage) -> Iterator[Cells]:
     """Receipts as rows of a table, with the number of warnings and fits."""
-    for item in payload["items"]:
-        counted = {name: len(item[name]) for name in ("warnings", "fits")}
-        yield {name: item[name] for name in COLUMNS} | counted
+    for item in page.items:
+        yield cells(item, COLUMNS) | {"warnings": len(item.warnings), "fits": len(item.fits)}
 
 
-def trail(database: Database, clutch_id: str, part: Part) -> dict[str, Any]:
+def trail(database: Database, clutch_id: str, part: Part) -> ChangePage:
     """The audit trail of a clutch and its runs, newest first. Raises NotFoundError."""
     with database.reading() as connection:
         repository.clutch(connection, clutch_id)
         rows = changes.page(connection, clutch_id, limit=part.most, before=part.number)
-    return part.of(rows, by_key("change_key"), changes.ChangeRow.entry)
+    return part.of(ChangePage, rows, by_key("change_key"), changes.ChangeRow.entry)
 
 
-def trail_rows(payload: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
-    for item in payload["items"]:
-        yield {name: item[name] for name in TRAIL_COLUMNS} | {name: to_text(item[name]) for name in ("before", "after")}
+def trail_rows(page: ChangePage) -> Iterator[Cells]:
+    """The audit trail as rows of a table; what changed is JSON."""
+    for item in page.items:
+        yield cells(item, TRAIL_COLUMNS) | {"before": to_text(item.before), "after": to_text(item.after)}
 
 
-def loops(database: Database, clutch_id: str, part: Part) -> dict[str, Any]:
+def loops(database: Database, clutch_id: str, part: Part) -> LoopPage:
     """Friction loops by cycles and pressure. Raises NotFoundError."""
     with database.reading() as connection:
         repository.clutch(connection, clutch_id)
         rows = runs.page(connection, clutch_id, kind=DYNAMIC, state=runs.ACCEPTED)
         held_count = runs.held(connection, [clutch_id]).get(clutch_id, 0)
-    items = [
-        {"run_id": row.run_id, "cycles": whole(row.cycles)} | loop for row in rows for loop in row.receipt["loops"]
-    ]
-    return held_runs_left_out(held_count) | part.sliced(items)
+    items = part.sliced(
+        [LoopItem(run_id=row.run_id, cycles=whole(row.cycles), **loop) for row in rows for loop in row.receipt["loops"]]
+    )
+    warnings = held_runs_left_out(held_count)
+    return LoopPage(held_runs=held_count, warnings=warnings, items=[*items.items], next=items.next)
+
+
+def loop_rows(page: LoopPage) -> Iterator[Cells]:
+    """Friction loops as rows of a table."""
+    for item in page.items:
+        yield cells(item, LOOP_COLUMNS) | {"held_runs": page.held_runs}

@@ -6,8 +6,7 @@ made of the tests up to then. Shares are of the whole life, from its origin to i
 """
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -15,11 +14,14 @@ from models.prognosis import scoring
 from models.prognosis.back_cast import BackCast
 from models.prognosis.criteria import QUANTILES
 from service import repository
+from service.api.fleet import EndedLife, FleetScores, ScoredLife, ScoredPrediction, Scores, ScoreSummary, StageSummary
+from service.api.life import LifePrediction, MethodName
 from service.channels import whole
-from service.clutch.assumptions import ALL_PRESSURES, Assumptions
+from service.clutch.assumptions import ALL_PRESSURES, Assumptions, severity_name
 from service.clutch.items import INSUFFICIENT
 from service.clutch.timeline import Event, Life
 from service.clutch.tracking import CARRIED, predict_at
+from service.tables import Cells, cells
 from storage import results
 from storage.engine.database import Database
 
@@ -30,12 +32,12 @@ STAGES, HALF_STAGE = (0.2, 0.4, 0.6, 0.8), 0.1
 _LOW, _HIGH = "0.05", "0.95"
 
 
-def scores_of_clutch(database: Database, clutch_id: str, method: str) -> dict[str, Any]:
+def scores_of_clutch(database: Database, clutch_id: str, method: MethodName) -> Scores:
     """The scores of a clutch's lives that came to their end; NotFoundError for an unknown clutch."""
     with database.reading() as connection:
         state = repository.state(connection, clutch_id)
         rows = results.predictions_of(connection, clutch_id, method, ALL_PRESSURES)
-    stored = {row.cycles: row.payload for row in rows}
+    stored = {row.cycles: repository.prediction(row) for row in rows}
     assumptions = state.assumptions()
     items = []
     for life in state.lives:
@@ -43,26 +45,24 @@ def scores_of_clutch(database: Database, clutch_id: str, method: str) -> dict[st
         if end is not None:
             predictions = stored if method in CARRIED else _predictions(life, assumptions, state.fraction, method)
             items.append(_scored(life, assumptions, end, predictions))
-    return {"clutch_id": clutch_id, "method": method, "revision": state.revision, "items": items, "next": None}
+    return Scores(clutch_id=clutch_id, method=method, revision=state.revision, items=items, next=None)
 
 
-def scores_of_fleet(scored: Iterable[Mapping[str, Any]], *, method: str) -> dict[str, Any]:
+def scores_of_fleet(scored: Iterable[Scores], *, method: MethodName) -> FleetScores:
     """All lives that came to their end, together and by stage of life, of what `scores_of_clutch` gives for each clutch."""
-    lives = [life | {"clutch_id": clutch["clutch_id"]} for clutch in scored for life in clutch["items"]]
-    tests = [test for life in lives for test in life["predictions"]]
-    stages = [
-        {"share_of_life": stage} | summary([test for test in tests if abs(test["share_of_life"] - stage) <= HALF_STAGE])
-        for stage in STAGES
-    ]
-    return {
-        "method": method,
-        "lives": [
-            {name: life[name] for name in ("clutch_id", "origin_cycles", "end_of_life_cycles")} for life in lives
+    lives = [(clutch.clutch_id, life) for clutch in scored for life in clutch.items]
+    tests = [test for _, life in lives for test in life.predictions]
+    by_stage = {stage: [test for test in tests if abs(test.share_of_life - stage) <= HALF_STAGE] for stage in STAGES}
+    return FleetScores(
+        method=method,
+        lives=[
+            EndedLife(clutch_id=clutch_id, origin_cycles=life.origin_cycles, end_of_life_cycles=life.end_of_life_cycles)
+            for clutch_id, life in lives
         ],
-        "overall": summary(tests),
-        "stages": stages,
-        "pit_histogram": _histogram(tests),
-    }
+        overall=summary(tests),
+        stages=[StageSummary(share_of_life=stage, **dict(summary(of_stage))) for stage, of_stage in by_stage.items()],
+        pit_histogram=_histogram(tests),
+    )
 
 
 def end_of_life(life: Life, assumptions: Assumptions, fraction: float) -> float | None:
@@ -71,8 +71,8 @@ def end_of_life(life: Life, assumptions: Assumptions, fraction: float) -> float 
     if not series.measurements:
         return None
     prediction = predict_at(life.events, assumptions, fraction, method="grid", back_cast=BackCast.nothing())
-    threshold = prediction["criterion"]["threshold_mean_cof"]
-    if prediction["status"] == INSUFFICIENT or threshold is None:
+    threshold = prediction.criterion.threshold_mean_cof
+    if prediction.status == INSUFFICIENT or threshold is None:
         return None
     cycles = np.array([life.events[index].cycles for index in series.events])
     values = np.array([measurement.value for measurement in series.measurements])
@@ -80,7 +80,7 @@ def end_of_life(life: Life, assumptions: Assumptions, fraction: float) -> float 
     return scoring.measured_end(cycles, values, threshold)
 
 
-def _predictions(life: Life, assumptions: Assumptions, fraction: float, method: str) -> dict[float, dict[str, Any]]:
+def _predictions(life: Life, assumptions: Assumptions, fraction: float, method: str) -> dict[float, LifePrediction]:
     """What a method whose predictions are not stored would have predicted at each test."""
     predictions = {}
     for index, event in enumerate(life.events):
@@ -90,76 +90,87 @@ def _predictions(life: Life, assumptions: Assumptions, fraction: float, method: 
     return predictions
 
 
-def _scored(life: Life, assumptions: Assumptions, end: float, made: dict[float, dict[str, Any]]) -> dict[str, Any]:
+def _scored(life: Life, assumptions: Assumptions, end: float, made: Mapping[float, LifePrediction]) -> ScoredLife:
     at = sorted({event.cycles for event in life.events if event.cofs and event.cycles < end})
-    tests = [_test(made[cycles], cycles, life.origin, end) for cycles in at if made[cycles]["status"] != INSUFFICIENT]
+    tests = [_test(made[cycles], cycles, life.origin, end) for cycles in at if made[cycles].status != INSUFFICIENT]
     horizon = scoring.prognostic_horizon(
-        [test["cycles"] - life.origin for test in tests],
-        [test["remaining_cycles"]["0.5"] for test in tests],
+        [test.cycles - life.origin for test in tests],
+        [test.remaining_cycles["0.5"] for test in tests],
         end - life.origin,
         ALPHA_HORIZON,
     )
-    return {
-        "origin_cycles": whole(life.origin),
-        "end_of_life_cycles": end,
-        "prognostic_horizon_cycles": horizon,
-        "summary": summary(tests),
-        "pit_histogram": _histogram(tests),
-        "predictions": tests,
-    } | assumptions.named()
+    return ScoredLife(
+        origin_cycles=whole(life.origin),
+        end_of_life_cycles=end,
+        prognostic_horizon_cycles=horizon,
+        summary=summary(tests),
+        pit_histogram=_histogram(tests),
+        predictions=tests,
+        model=assumptions.model.name,
+        prior=assumptions.prior.name,
+        severity=severity_name(assumptions.severity),
+    )
 
 
-def _test(prediction: dict[str, Any], cycles: float, origin: float, end: float) -> dict[str, Any]:
+def _test(prediction: LifePrediction, cycles: float, origin: float, end: float) -> ScoredPrediction:
     """One prediction and how right it was; a quantile beyond the horizon is scored as if it were there."""
-    remaining, length = prediction["remaining_cycles"], end - origin
-    horizon = origin + prediction["horizon_cycles"]
-    ends = [horizon if value is None else value for value in prediction["end_of_life_cycles"].values()]
+    remaining, length = prediction.remaining_cycles, end - origin
+    horizon = origin + prediction.horizon_cycles
+    ends = [horizon if value is None else value for value in prediction.end_of_life_cycles.values()]
     crps = scoring.crps_of_quantiles(QUANTILES, ends, end)
-    low, high = (prediction["end_of_life_cycles"][quantile] for quantile in (_LOW, _HIGH))
-    return {
-        "cycles": whole(cycles),
-        "runs_used": prediction["runs_used"],
-        "share_of_life": (cycles - origin) / length,
-        "true_remaining_cycles": end - cycles,
-        "remaining_cycles": remaining,
-        "crps_cycles": crps,
-        "crps_share": crps / length,
-        "interval_share": (ends[-1] - ends[0]) / length,
-        "covered": scoring.covered(low, high, end),
-        "pit": scoring.pit_of_quantiles(QUANTILES, ends, end),
-        "alpha_lambda": scoring.alpha_lambda(remaining["0.5"], cycles, end, ALPHA_LAMBDA),
-    }
+    low, high = (prediction.end_of_life_cycles[quantile] for quantile in (_LOW, _HIGH))
+    return ScoredPrediction(
+        cycles=whole(cycles),
+        runs_used=prediction.runs_used,
+        share_of_life=(cycles - origin) / length,
+        true_remaining_cycles=end - cycles,
+        remaining_cycles=remaining,
+        crps_cycles=crps,
+        crps_share=crps / length,
+        interval_share=(ends[-1] - ends[0]) / length,
+        covered=scoring.covered(low, high, end),
+        pit=scoring.pit_of_quantiles(QUANTILES, ends, end),
+        alpha_lambda=scoring.alpha_lambda(remaining["0.5"], cycles, end, ALPHA_LAMBDA),
+    )
 
 
-def summary(tests: Sequence[dict[str, Any]]) -> dict[str, Any]:
+def summary(tests: Sequence[ScoredPrediction]) -> ScoreSummary:
     """Means over predictions; null where there are none."""
 
     def mean(name: str) -> float | None:
-        return math.fsum(test[name] for test in tests) / len(tests) if tests else None
+        return math.fsum(getattr(test, name) for test in tests) / len(tests) if tests else None
 
-    return {
-        "predictions": len(tests),
-        "crps_share": mean("crps_share"),
-        "interval_share": mean("interval_share"),
-        "coverage": mean("covered"),
-        "alpha_lambda": mean("alpha_lambda"),
-    }
-
-
-def _histogram(tests: Sequence[dict[str, Any]]) -> list[float]:
-    return scoring.pit_histogram([test["pit"] for test in tests]).tolist() if tests else []
+    return ScoreSummary(
+        predictions=len(tests),
+        crps_share=mean("crps_share"),
+        interval_share=mean("interval_share"),
+        coverage=mean("covered"),
+        alpha_lambda=mean("alpha_lambda"),
+    )
 
 
-def rows(payload: Mapping[str, Any]) -> list[dict[str, Any]]:
+def _histogram(tests: Sequence[ScoredPrediction]) -> list[float]:
+    return scoring.pit_histogram([test.pit for test in tests]).tolist() if tests else []
+
+
+def stage_rows(fleet: FleetScores) -> Iterator[Cells]:
+    """Means over the predictions of each stage of life as rows of a table, then over all."""
+    for stage in fleet.stages:
+        yield {"share_of_life": stage.share_of_life} | dict(stage)
+    yield {"share_of_life": None} | dict(fleet.overall)
+
+
+def rows(answer: Scores) -> list[Cells]:
+    """Scored predictions as rows of a table."""
     names = (
         "cycles", "runs_used", "share_of_life", "true_remaining_cycles", "crps_cycles", "crps_share", "interval_share",
     )  # fmt: skip
     judged = ("covered", "pit", "alpha_lambda")
     return [
-        {"end_of_life_cycles": item["end_of_life_cycles"]}
-        | {name: test[name] for name in names}
-        | {f"remaining_cycles_{quantile}": value for quantile, value in test["remaining_cycles"].items()}
-        | {name: test[name] for name in judged}
-        for item in payload["items"]
-        for test in item["predictions"]
+        {"end_of_life_cycles": item.end_of_life_cycles}
+        | cells(test, names)
+        | {f"remaining_cycles_{quantile}": value for quantile, value in test.remaining_cycles.items()}
+        | cells(test, judged)
+        for item in answer.items
+        for test in item.predictions
     ]

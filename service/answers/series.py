@@ -4,12 +4,15 @@ Every row is stored or follows in closed form from a stored fit, as the slopes d
 """
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import chain
-from typing import Any
 
 from models.friction.criteria import Z90
 from service import repository
 from service.api.clutch import ClutchIn
+from service.api.life import LifePrediction
+from service.api.over_life import MeasuredEngagement, SeriesItem, SeriesPage
+from service.api.run import Fit, Loop, Receipt
 from service.channels import bar, whole
 from service.clutch.analysis import LevelFit
 from service.clutch.assumptions import ALL_PRESSURES, MEAN_COF
@@ -27,16 +30,12 @@ from service.clutch.quantities.measured import (
 )
 from service.clutch.timeline import DYNAMIC, STATIONARY
 from service.paging import Part
+from service.tables import Cells
 from storage import results, runs
 from storage.engine.database import Database
-from storage.results import PredictionRow
-from storage.runs import RunRow
-
-#: Over all pressures, and at no frequency or speed.
-_NOWHERE = {"pressure_bar": None, "frequency_hz": None, "speed_rpm": None}
 
 
-def series(database: Database, clutch_id: str, part: Part, quantity: str | None) -> dict[str, Any]:
+def series(database: Database, clutch_id: str, part: Part, quantity: str | None) -> SeriesPage:
     """Each quantity of each test by cycles, the slopes of its curves, those of each friction loop, the indicators of each
     engagement, then the remaining cycles as they were predicted, and how many runs are held; of one quantity, or of all.
 
@@ -51,106 +50,142 @@ def series(database: Database, clutch_id: str, part: Part, quantity: str | None)
         engaged = repository.engagements(connection, clutch_id)
         predicted = results.predictions_of(connection, clutch_id, SHOWN, ALL_PRESSURES)
         held_count = runs.held(connection, [clutch_id]).get(clutch_id, 0)
-    measured = (item for row in rows for fit in row.receipt["fits"] for item in _measured(row.receipt, fit))
-    slopes = _slopes(repository.record(clutch), rows, levels)
-    lags = (item for row in dynamic for loop in row.receipt["loops"] for item in _rows_of_loop(row.receipt, loop))
+    tests, dynamic_tests = list(map(repository.receipt, rows)), map(repository.receipt, dynamic)
+    measured = (item for test in tests for fit in test.fits for item in _measured(_RunColumns.of(test), fit))
+    slopes = _slopes(repository.record(clutch), tests, levels)
+    lags = (item for test in dynamic_tests for loop in test.loops for item in _rows_of_loop(_RunColumns.of(test), loop))
     indicators = (item for row in engaged for item in _indicators(row))
-    ahead = (item for row in predicted for item in _predicted(row))
+    ahead = (item for row in predicted for item in _predicted(row.cycles, repository.prediction(row)))
     newest = predicted[-1].cycles if predicted else 0.0
     waiting = [_ahead_row(newest, "held_runs", "1", float(held_count))] if held_count else []
     items = chain(measured, slopes, lags, indicators, ahead, waiting)
-    return part.sliced([item for item in items if quantity in (None, item["quantity"])])
+    shown = part.sliced([item for item in items if quantity in (None, item.quantity)])
+    return SeriesPage(items=[*shown.items], next=shown.next)
 
 
-def _measured(receipt: dict[str, Any], fit: dict[str, Any]) -> Iterator[dict[str, Any]]:
-    values = [(MEAN_COF, "1", fit["mean_cof"], fit["mean_cof_sd"])]
+COLUMNS = (
+    "cycles", "time", "run_id", "quantity", "unit", "pressure_bar", "value", "lower", "upper", "frequency_hz", "speed_rpm",
+    "source",
+)  # fmt: skip
+
+
+def rows(page: SeriesPage) -> Iterator[Cells]:
+    """The same as rows of a table."""
+    return map(dict, page.items)
+
+
+@dataclass(frozen=True, slots=True)
+class _RunColumns:
+    """The run that rows are of."""
+
+    run_id: str
+    cycles: float
+    time: str
+
+    @classmethod
+    def of(cls, receipt: Receipt) -> "_RunColumns":
+        return cls(receipt.run_id, receipt.cycles, receipt.started_at or receipt.received_at)
+
+    def row(
+        self,
+        quantity: str,
+        unit: str,
+        value: float | None,
+        sd: float | None,
+        *,
+        pressure_bar: float | None = None,
+        frequency_hz: float | None = None,
+        speed_rpm: float | None = None,
+    ) -> SeriesItem:
+        """A value with its 90 % interval."""
+        return SeriesItem(
+            cycles=self.cycles,
+            time=self.time,
+            run_id=self.run_id,
+            source="run",
+            pressure_bar=pressure_bar,
+            frequency_hz=frequency_hz,
+            speed_rpm=speed_rpm,
+            quantity=quantity,
+            unit=unit,
+            value=value,
+            lower=None if value is None or sd is None else value - Z90 * sd,
+            upper=None if value is None or sd is None else value + Z90 * sd,
+        )
+
+
+def _measured(run: _RunColumns, fit: Fit) -> Iterator[SeriesItem]:
+    yield run.row(MEAN_COF, "1", fit.mean_cof, fit.mean_cof_sd, pressure_bar=fit.pressure_bar)
     for public, unit in PARAMETER_UNITS.values():
-        values.append((public, unit, fit["parameters"][public], fit["standard_errors"][public]))
-    of_run = _columns_of_run(receipt) | {"pressure_bar": fit["pressure_bar"]}
-    for quantity, unit, value, sd in values:
-        yield of_run | _row(quantity, unit, value, sd)
+        value, sd = getattr(fit.parameters, public), getattr(fit.standard_errors, public)
+        yield run.row(public, unit, value, sd, pressure_bar=fit.pressure_bar)
 
 
 def _slopes(
-    record: ClutchIn, rows: Sequence[RunRow], levels: Mapping[str, Sequence[LevelFit]]
-) -> Iterator[dict[str, Any]]:
+    record: ClutchIn, receipts: Sequence[Receipt], levels: Mapping[str, Sequence[LevelFit]]
+) -> Iterator[SeriesItem]:
     """dμ/dv of every fitted curve, at the usual speeds and those of the clutch's criteria."""
     geometry = record.geometry.to_model()
     limits = record.end_of_life.criteria
     speeds = sorted({*SLOPE_SPEEDS, *(limit.speed_rpm for limit in limits if limit.speed_rpm is not None)})
-    for row in rows:
-        for curve in curves_of(levels.get(row.run_id, ())):
+    for receipt in receipts:
+        run = _RunColumns.of(receipt)
+        for curve in curves_of(levels.get(run.run_id, ())):
             for speed in speeds:
                 slope = slope_of(curve, geometry, speed)
                 if slope is not None:
-                    place = {"pressure_bar": bar(curve.fit.pressure), "speed_rpm": speed}
-                    yield _columns_of_run(row.receipt) | _row(SLOPE, QUANTITIES[SLOPE].unit, *slope) | place
+                    pressure = bar(curve.fit.pressure)
+                    yield run.row(SLOPE, QUANTITIES[SLOPE].unit, *slope, pressure_bar=pressure, speed_rpm=speed)
 
 
-def _rows_of_loop(receipt: dict[str, Any], loop: dict[str, Any]) -> Iterator[dict[str, Any]]:
-    frequency = loop["frequency_hz"]
-    place = {
-        "pressure_bar": loop["pressure_bar"],
-        "frequency_hz": None if frequency is None else rounded_frequency(frequency),
-    }
-    for quantity, (value, sd) in LOOP_COLUMNS.items():
-        if loop[value] is not None and loop[sd] is not None:
-            yield _columns_of_run(receipt) | _row(quantity, QUANTITIES[quantity].unit, loop[value], loop[sd]) | place
+def _rows_of_loop(run: _RunColumns, loop: Loop) -> Iterator[SeriesItem]:
+    frequency = None if loop.frequency_hz is None else rounded_frequency(loop.frequency_hz)
+    for quantity, names in LOOP_COLUMNS.items():
+        value, sd = (getattr(loop, name) for name in names)
+        if value is not None and sd is not None:
+            unit = QUANTITIES[quantity].unit
+            yield run.row(quantity, unit, value, sd, pressure_bar=loop.pressure_bar, frequency_hz=frequency)
 
 
-def _indicators(row: dict[str, Any]) -> Iterator[dict[str, Any]]:
+def _indicators(row: MeasuredEngagement) -> Iterator[SeriesItem]:
+    run = _RunColumns(row.run_id, row.cycles, row.time)
     for quantity, indicator in ALL_INDICATORS.items():
-        estimate = row["indicators"][quantity]
+        estimate = getattr(row.indicators, quantity)
         if estimate is not None:
-            yield _columns_of_run(row, row["time"]) | _row(quantity, indicator.unit, estimate["value"], estimate["sd"])
+            yield run.row(quantity, indicator.unit, estimate.value, estimate.sd)
 
 
-def _columns_of_run(run: dict[str, Any], time: str | None = None) -> dict[str, Any]:
-    """What a row says of a run, by its receipt, or by a row that has the time."""
-    time = time or run["started_at"] or run["received_at"]
-    return {"cycles": run["cycles"], "time": time, "run_id": run["run_id"], "source": "run", **_NOWHERE}
-
-
-def _row(quantity: str, unit: str, value: float | None, sd: float) -> dict[str, Any]:
-    return {
-        "quantity": quantity,
-        "unit": unit,
-        "value": value,
-        "lower": None if value is None else value - Z90 * sd,
-        "upper": None if value is None else value + Z90 * sd,
-    }
-
-
-def _predicted(row: PredictionRow) -> Iterator[dict[str, Any]]:
+def _predicted(cycles: float, prediction: LifePrediction) -> Iterator[SeriesItem]:
     """What was predicted after a run; with too few tests the safe bound alone: mean COF stands among the measurements."""
-    payload = row.payload
-    current, remaining = payload["current"], payload["remaining_cycles"]
-    mean, sd = current["mean_cof"], current["mean_cof_sd"]
-    if mean is None or payload["status"] == INSUFFICIENT:
+    current, remaining = prediction.current, prediction.remaining_cycles
+    mean, sd = current.mean_cof, current.mean_cof_sd
+    if mean is None or sd is None or prediction.status == INSUFFICIENT:
         cof: tuple[float | None, ...] = (None, None, None)
     else:
         cof = (mean, mean - Z90 * sd, mean + Z90 * sd)
-    yield _ahead_row(row.cycles, MEAN_COF, "1", *cof)
-    yield _ahead_row(row.cycles, "health", "1", current["health"])
+    yield _ahead_row(cycles, MEAN_COF, "1", *cof)
+    yield _ahead_row(cycles, "health", "1", current.health)
     quantiles = (remaining[quantile] for quantile in ("0.5", "0.05", "0.95"))
-    yield _ahead_row(row.cycles, "remaining_cycles", "cycles", *quantiles)
-    yield _ahead_row(row.cycles, "at_least", "cycles", payload["at_least"])
-    yield _ahead_row(row.cycles, "probability_of_reaching", "1", payload["probability_of_reaching"])
+    yield _ahead_row(cycles, "remaining_cycles", "cycles", *quantiles)
+    yield _ahead_row(cycles, "at_least", "cycles", prediction.at_least)
+    yield _ahead_row(cycles, "probability_of_reaching", "1", prediction.probability_of_reaching)
 
 
 def _ahead_row(
     cycles: float, quantity: str, unit: str, value: float | None, lower: float | None = None, upper: float | None = None
-) -> dict[str, Any]:
+) -> SeriesItem:
     """A row of no test: over all pressures, at cycles since new."""
-    return {
-        "cycles": whole(cycles),
-        "time": None,
-        "run_id": None,
-        "source": "track",
-        "quantity": quantity,
-        "unit": unit,
-        **_NOWHERE,
-        "value": value,
-        "lower": lower,
-        "upper": upper,
-    }
+    return SeriesItem(
+        cycles=whole(cycles),
+        time=None,
+        run_id=None,
+        source="track",
+        pressure_bar=None,
+        frequency_hz=None,
+        speed_rpm=None,
+        quantity=quantity,
+        unit=unit,
+        value=value,
+        lower=lower,
+        upper=upper,
+    )

@@ -2,7 +2,7 @@
 the parameters as their tracks have them over cycles, the pressure laws going through them, and torque over speed."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -10,6 +10,7 @@ from models.arrays import FloatArray
 from models.clutch import Geometry
 from models.friction.criteria import FEWEST_PRESSURES
 from models.friction.pressure_laws import (
+    AsymptoticPressureLaw,
     LinearPressureLaw,
     PressureLaws,
     fit_pressure_laws,
@@ -19,84 +20,132 @@ from models.friction.pressure_laws import (
 from models.friction.stribeck import PARAMETER_NAMES, StribeckParameters, torque
 from models.prognosis.criteria import FEWEST_TESTS
 from service import repository
+from service.api.over_life import (
+    AsymptoticLaw,
+    LinearLaw,
+    PressureLawsOut,
+    StribeckItem,
+    StribeckPage,
+    SurfaceParameters,
+    Surfaces,
+)
+from service.api.run import Fit
 from service.channels import PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM, bar, whole
 from service.clutch.analysis import LevelFit
-from service.clutch.assumptions import Assumptions
+from service.clutch.assumptions import Assumptions, severity_name
 from service.clutch.condition import held_runs_left_out
 from service.clutch.items import PARAMETER_UNITS
 from service.clutch.quantities.measured import parameter_medians
 from service.clutch.timeline import Event, lives_of
 from service.errors import NotFoundError
-from service.paging import Part, by_cycles
+from service.paging import Part, by_cycles, to_cursor
+from service.tables import Cells, cells
 from storage import runs
 from storage.engine.database import Database
 from storage.runs import RunRow
 
 
-def curves(database: Database, clutch_id: str, part: Part) -> dict[str, Any]:
+def curves(database: Database, clutch_id: str, part: Part) -> StribeckPage:
     """Stationary tests by cycles with their fits and pressure laws, of the open clutch neither. Raises NotFoundError."""
     with database.reading() as connection:
         repository.clutch(connection, clutch_id)
         rows = runs.page(connection, clutch_id, limit=part.most, after=part.after, fitted=True, state=runs.ACCEPTED)
         levels = repository.levels(connection, clutch_id)
         held_count = runs.held(connection, [clutch_id]).get(clutch_id, 0)
-    tests = part.of(rows, by_cycles("run_id"), lambda row: _item(row, levels.get(row.run_id, [])))
-    return held_runs_left_out(held_count) | tests  # the next page last, where it is found
+    return StribeckPage(
+        held_runs=held_count,
+        warnings=held_runs_left_out(held_count),
+        items=[_item(row, levels.get(row.run_id, [])) for row in rows[: part.limit]],
+        next=to_cursor(part.next(rows, by_cycles("run_id"))),
+    )
 
 
-def rows(payload: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
-    for item in payload["items"]:
-        for fit in item["fits"]:
-            plain = {name: fit[name] for name in fit if name not in ("parameters", "standard_errors", "undetermined")}
-            errors = {f"{name}_se": value for name, value in fit["standard_errors"].items()}
-            yield {"run_id": item["run_id"], "cycles": item["cycles"], **plain, **fit["parameters"], **errors} | {
-                "held_runs": payload["held_runs"]
-            }
+def rows(page: StribeckPage) -> Iterator[Cells]:
+    """Fitted curves as rows of a table, a row a test and pressure."""
+    names = [name for name in Fit.model_fields if name not in ("parameters", "standard_errors", "undetermined")]
+    for item in page.items:
+        for fit in item.fits:
+            errors = {f"{name}_se": value for name, value in fit.standard_errors}
+            own = cells(fit, names) | dict(fit.parameters) | errors
+            yield {"run_id": item.run_id, "cycles": item.cycles} | own | {"held_runs": page.held_runs}
 
 
-def _item(row: RunRow, levels: Sequence[LevelFit]) -> dict[str, Any]:
+def _item(row: RunRow, levels: Sequence[LevelFit]) -> StribeckItem:
     fits = [level.fit for level in levels]
     laws = fit_pressure_laws(fits)
-    return {
-        "run_id": row.run_id,
-        "cycles": whole(row.cycles),
-        "fits": row.receipt["fits"],
-        "pressure_laws": None if laws is None else _laws(laws, law_covariances(fits, laws)),
-    }
+    return StribeckItem(
+        run_id=row.run_id,
+        cycles=whole(row.cycles),
+        fits=row.receipt["fits"],
+        pressure_laws=None if laws is None else _laws(laws, law_covariances(fits, laws)),
+    )
 
 
-def _laws(laws: PressureLaws, covariances: Mapping[str, FloatArray]) -> dict[str, Any]:
+def _laws(laws: PressureLaws, covariances: Mapping[str, FloatArray]) -> PressureLawsOut:
     """The pressure laws in bar, by public name."""
-    items: dict[str, Any] = {}
-    for name, (public, _) in PARAMETER_UNITS.items():
-        law = getattr(laws, name)
-        if isinstance(law, LinearPressureLaw):
-            items[public] = {"intercept": law.intercept, "slope_per_bar": law.slope * PASCALS_PER_BAR}
-            in_bar = np.array([1.0, PASCALS_PER_BAR])
-        else:
-            items[public] = {"asymptote": law.asymptote, "excess": law.excess, "decay_bar": law.decay / PASCALS_PER_BAR}
-            in_bar = np.array([1.0, 1.0, 1.0 / PASCALS_PER_BAR])
-        items[public]["covariance"] = (covariances[name] * np.outer(in_bar, in_bar)).tolist()
-    return items
+    return PressureLawsOut.model_validate(
+        {public: _law(getattr(laws, name), covariances[name]) for name, (public, _) in PARAMETER_UNITS.items()}
+    )
+
+
+def _law(law: LinearPressureLaw | AsymptoticPressureLaw, covariance: FloatArray) -> LinearLaw | AsymptoticLaw:
+    """A pressure law in bar, with the covariance of its coefficients."""
+    if isinstance(law, LinearPressureLaw):
+        in_bar = np.array([1.0, PASCALS_PER_BAR])
+        own = (covariance * np.outer(in_bar, in_bar)).tolist()
+        return LinearLaw(intercept=law.intercept, slope_per_bar=law.slope * PASCALS_PER_BAR, covariance=own)
+    in_bar = np.array([1.0, 1.0, 1.0 / PASCALS_PER_BAR])
+    own = (covariance * np.outer(in_bar, in_bar)).tolist()
+    return AsymptoticLaw(
+        asymptote=law.asymptote, excess=law.excess, decay_bar=law.decay / PASCALS_PER_BAR, covariance=own
+    )
 
 
 #: Places along cycles, pressure and speed.
 CYCLES, PRESSURES, SPEEDS = 15, 13, 20
 
 
-def surface(database: Database, clutch_id: str) -> dict[str, Any]:
+def surface(database: Database, clutch_id: str) -> Surfaces:
     """`/surfaces` of a clutch as it is now. Raises NotFoundError."""
     with database.reading() as connection:
         state, levels = repository.state(connection, clutch_id), repository.levels(connection, clutch_id)
     assumptions = state.assumptions()
-    grids = surfaces(state.events, assumptions, levels, state.geometry)
-    head = {"clutch_id": clutch_id, "revision": state.revision}
-    return head | held_runs_left_out(len(state.held)) | grids | assumptions.named()
+    grids = surface_grids(state.events, assumptions, levels, state.geometry)
+    return Surfaces(
+        clutch_id=clutch_id,
+        revision=state.revision,
+        held_runs=len(state.held),
+        warnings=held_runs_left_out(len(state.held)),
+        cycles=[whole(round(cycle, 3)) for cycle in grids.cycles.tolist()],
+        pressure_bar=[bar(pressure) for pressure in grids.pressure.tolist()],
+        speed_rpm=(grids.speed / RADIANS_PER_SECOND_PER_RPM).round(6).tolist(),
+        parameters=SurfaceParameters(
+            **{
+                PARAMETER_UNITS[name][0]: grid.tolist()
+                for name, grid in zip(PARAMETER_NAMES, grids.parameters, strict=True)
+            }
+        ),
+        torque_nm=grids.torque.tolist(),
+        model=assumptions.model.name,
+        prior=assumptions.prior.name,
+        severity=severity_name(assumptions.severity),
+    )
 
 
-def surfaces(
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SurfaceGrids:
+    """Parameters [4, k, p] over cycles [k] by pressure [p, Pa], torque [k, p, v, Nm] over speed [v, rad/s] too."""
+
+    cycles: FloatArray
+    pressure: FloatArray
+    speed: FloatArray
+    parameters: FloatArray
+    torque: FloatArray
+
+
+def surface_grids(
     events: Sequence[Event], assumptions: Assumptions, fits: Mapping[str, Sequence[LevelFit]], geometry: Geometry
-) -> dict[str, Any]:
+) -> SurfaceGrids:
     """Parameters over cycles [k] by pressure [p], torque over cycles, pressure and speed [v], of the present life; with too
     few tests for a track at the cycles of these alone. Raises NotFoundError before a test determines all parameters."""
     history = lives_of(events)
@@ -125,24 +174,14 @@ def surfaces(
     speed = np.linspace(*speed_range, SPEEDS)
     parameters = StribeckParameters.from_array(surface[..., None])
     torques = torque(geometry.sliding_velocity(speed), parameters)
-    return {
-        "cycles": [whole(round(cycle, 3)) for cycle in cycles.tolist()],
-        "pressure_bar": [bar(pressure) for pressure in pressures.tolist()],
-        "speed_rpm": (speed / RADIANS_PER_SECOND_PER_RPM).round(6).tolist(),
-        "parameters": {
-            PARAMETER_UNITS[name][0]: grid.tolist() for name, grid in zip(PARAMETER_NAMES, surface, strict=True)
-        },
-        "torque_nm": torques.tolist(),
-    }
+    return SurfaceGrids(cycles=cycles, pressure=pressures, speed=speed, parameters=surface, torque=torques)
 
 
-def surface_rows(grids: Mapping[str, Any]) -> list[dict[str, Any]]:
+def surface_rows(answer: Surfaces) -> Iterator[Cells]:
     """The surfaces as rows of a table, a row a count of cycles, a pressure and a speed."""
-    return [
-        {"cycles": cycles, "pressure_bar": pressure, "speed_rpm": speed}
-        | {name: grid[i][j] for name, grid in grids["parameters"].items()}
-        | {"torque_nm": grids["torque_nm"][i][j][k], "held_runs": grids["held_runs"]}
-        for i, cycles in enumerate(grids["cycles"])
-        for j, pressure in enumerate(grids["pressure_bar"])
-        for k, speed in enumerate(grids["speed_rpm"])
-    ]
+    for i, cycles in enumerate(answer.cycles):
+        for j, pressure in enumerate(answer.pressure_bar):
+            for k, speed in enumerate(answer.speed_rpm):
+                place = {"cycles": cycles, "pressure_bar": pressure, "speed_rpm": speed}
+                parameters = {name: grid[i][j] for name, grid in answer.parameters}
+                yield place | parameters | {"torque_nm": answer.torque_nm[i][j][k], "held_runs": answer.held_runs}

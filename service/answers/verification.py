@@ -213,14 +213,16 @@ def _stored(connection: Connection, clutch_id: str) -> _Results:
     return named
 
 
-def _recomputed(computed: Results) -> dict[str, Any]:
-    named = {f"the receipt of run {run_id}": _plain(receipt) for run_id, receipt in computed.receipts.items()}
+def _recomputed(computed: Results) -> Mapping[str, object]:
+    named: dict[str, object] = {
+        f"the receipt of run {run_id}": repository.json_of(receipt) for run_id, receipt in computed.receipts.items()
+    }
     for run_id, levels in computed.levels.items():
         rows = repository.fit_rows(levels, computed.cofs.get(run_id, {}))
         named |= {_fit(run_id, row.pressure): _plain(asdict(row)) for row in rows}
     if computed.tracking is not None:
         for item in computed.tracking.predictions:
-            named[_prediction(item.method, item.cycles)] = _plain(item.payload)
+            named[_prediction(item.method, item.cycles)] = repository.json_of(item.prediction)
     return named
 
 

@@ -1,6 +1,7 @@
 """Alarms: rules, what they raise, receivers, and what these were sent."""
 
-from typing import Annotated, Any, Literal, Self
+from collections.abc import Mapping
+from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, Field, StringConstraints, model_validator
 
@@ -115,7 +116,10 @@ class AlarmOut(AlarmIn):
     saved_by: str = Field(description="Who saved it")
 
 
-AlarmPage = base.page_of("AlarmPage", AlarmOut, "Rules by name.", "The rules")
+class AlarmPage(base.Page[AlarmOut]):
+    """Rules by name."""
+
+    items: list[AlarmOut] = Field(description="The rules")
 
 
 class EventOut(base.Answer):
@@ -126,10 +130,10 @@ class EventOut(base.Answer):
     clutch_id: str = Field(description="The clutch")
     quantity: WatchedQuantity = Field(description="What is watched")
     name: str = Field(description="The rule's name at that time")
-    value: float | None = Field(description="The value that raised it; null if it is not a number")
-    limit: float | None = Field(description="The limit that it passed; null if the rule has none")
+    value: base.Real | None = Field(description="The value that raised it; null if it is not a number")
+    limit: base.Real | None = Field(description="The limit that it passed; null if the rule has none")
     message: str = Field(description="The alarm in a sentence")
-    as_of_cycles: float | None = Field(description="Duty cycles since new of the clutch's latest run at that time")
+    as_of_cycles: base.Real | None = Field(description="Duty cycles since new of the clutch's latest run at that time")
     state: EventState = Field(description="`raised`, `acknowledged` or `cleared`")
     raised_at: str = Field(description="When it was raised")
     acknowledged_at: str | None = Field(description="When it was acknowledged")
@@ -138,7 +142,10 @@ class EventOut(base.Answer):
     cleared_at: str | None = Field(description="When the alarm was cleared")
 
 
-EventPage = base.page_of("EventPage", EventOut, "Alarms, newest first.", "The alarms")
+class EventPage(base.Page[EventOut]):
+    """Alarms, newest first."""
+
+    items: list[EventOut] = Field(description="The alarms")
 
 
 class AcknowledgeIn(base.Schema):
@@ -184,7 +191,10 @@ class WebhookOut(base.Answer):
     created_by: str = Field(description="Who made it")
 
 
-WebhookPage = base.page_of("WebhookPage", WebhookOut, "Receivers by name.", "The receivers")
+class WebhookPage(base.Page[WebhookOut]):
+    """Receivers by name."""
+
+    items: list[WebhookOut] = Field(description="The receivers")
 
 
 class DeliveryOut(base.Answer):
@@ -205,7 +215,10 @@ class DeliveryOut(base.Answer):
     next_attempt_at: str | None = Field(description="Time of the next attempt; null if there is none")
 
 
-DeliveryPage = base.page_of("DeliveryPage", DeliveryOut, "Deliveries, newest first.", "The deliveries")
+class DeliveryPage(base.Page[DeliveryOut]):
+    """Deliveries, newest first."""
+
+    items: list[DeliveryOut] = Field(description="The deliveries")
 
 
 class TestedOut(base.Answer):
@@ -217,7 +230,7 @@ class TestedOut(base.Answer):
     message: str = Field(description="The result in a sentence")
 
 
-EXAMPLE: dict[str, Any] = {
+EXAMPLE: Mapping[str, object] = {
     "clutch_id": "bench3-017",
     "quantity": "remaining_cycles",
     "probability": 0.05,

@@ -4,8 +4,9 @@ The limits refuse mistyped values and overflow, not unusual clutches. Errors fol
 """
 
 import re
+from collections.abc import Callable
 from datetime import UTC, datetime
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Generic, Literal, TypeVar
 
 from pydantic import (
     AfterValidator,
@@ -14,10 +15,11 @@ from pydantic import (
     ConfigDict,
     Field,
     PlainSerializer,
+    SerializeAsAny,
     StringConstraints,
     ValidationInfo,
     WithJsonSchema,
-    create_model,
+    WrapValidator,
 )
 
 from service.channels import whole
@@ -116,6 +118,10 @@ def rule_in_words(kind: str, message: str) -> str:
     return rule
 
 
+Item = TypeVar("Item")
+Row = TypeVar("Row", bound=BaseModel)
+
+
 class Schema(BaseModel):
     """Base of request bodies: unknown fields are refused."""
 
@@ -123,9 +129,9 @@ class Schema(BaseModel):
 
 
 class Answer(BaseModel):
-    """Base of answers, for the API's description."""
+    """Base of answers: a value that goes out as JSON in the order of its fields, without those that were not given."""
 
-    model_config = ConfigDict(extra="forbid")
+    model_config = ConfigDict(extra="forbid", frozen=True)
 
 
 # --- in requests ---
@@ -171,23 +177,32 @@ Reason = Annotated[str, StringConstraints(max_length=LONGEST_REASON, strip_white
 
 # --- in answers ---
 
+
+def _as_computed(number: float, checked: Callable[[float], float]) -> float:
+    """The number as it was given: a whole one that was computed as such stays one."""
+    as_float = checked(number)
+    return number if type(number) is int else as_float
+
+
+#: A number of an answer; whole ones that were computed as such are written without a decimal point.
+Real = Annotated[float, WrapValidator(_as_computed), SerializeAsAny(), WithJsonSchema({"type": "number"})]
 ClutchName = Annotated[str, Field(description="The clutch's name")]
 RunName = Annotated[str, Field(description="The run's name")]
-RunCycles = Annotated[float, Field(description="Duty cycles since new when the run was made")]
+RunCycles = Annotated[Real, Field(description="Duty cycles since new when the run was made")]
 Revision = Annotated[int, Field(description="Increases with every change of the clutch's results")]
 Next = Annotated[str | None, Field(description="The `cursor` of the next page; null on the last one")]
 
 
-def schema_fields(schema: type[BaseModel], row: object, **own: Any) -> dict[str, Any]:
-    """A stored row as the schema has it, field by field; `own` are those that the row calls otherwise or has not."""
-    return {name: own[name] if name in own else getattr(row, name) for name in schema.model_fields}
+def of_row(answer: type[Row], row: object, **own: Any) -> Row:
+    """A stored row as the answer has it, field by field; `own` are those that the row calls otherwise or has not."""
+    return answer(**{name: own[name] if name in own else getattr(row, name) for name in answer.model_fields})
 
 
-def page_of(name: str, item: type[BaseModel], says: str, items: str, *, base: type[Answer] = Answer) -> type[Answer]:
-    """The schema of a list that is answered a page at a time; `says` and `items` describe it and its items, `base` has what
-    stands beside them."""
-    fields: Any = {"items": (list[item], Field(description=items)), "next": (Next, ...)}  # type: ignore[valid-type]
-    return create_model(name, __base__=base, __doc__=says, **fields)
+class Page(Answer, Generic[Item]):
+    """A part of a list."""
+
+    items: list[Item]
+    next: Next
 
 
 class ProblemError(Answer):

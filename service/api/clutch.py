@@ -2,7 +2,7 @@
 
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import BeforeValidator, Field, JsonValue, model_validator
 
 from models.clutch import Geometry
 from models.degradation.severity import Severity, SeverityBasis
@@ -148,7 +148,7 @@ class ClutchEdit(base.Schema):
             raise ValueError("reason must say why the record changes")
         return self
 
-    def fields(self) -> dict[str, Any]:
+    def fields(self) -> dict[str, JsonValue]:
         """The fields of the record that were given, as JSON."""
         sent = self.model_fields_set - {"reason", "archived"}
         return self.model_dump(mode="json", include=sent)
@@ -158,21 +158,21 @@ class ClutchSummary(base.Answer):
     """Current health and remaining life, as lists show them; null while unknown."""
 
     status: str = Field(description="The status of `/remaining-useful-life`")
-    as_of_cycles: float | None = Field(description="Duty cycles since new of the latest run")
+    as_of_cycles: base.Real | None = Field(description="Duty cycles since new of the latest run")
     runs_used: int = Field(description="Number of stationary tests that the prediction uses")
     current: life.Current = Field(description="The clutch's present state")
     criterion: life.Criterion = Field(description="The end-of-life criterion that will most probably be reached first")
     remaining_cycles: life.Quantiles = Field(description="Quantiles of the remaining duty cycles, by probability")
     at_least: life.AtLeast
-    at_least_at: life.AtLeastAt
-    counted_from: life.CountedFrom
-    held_runs: life.Held
-    statement: life.Statement
-    probability_of_reaching: float | None = Field(
+    probability_of_reaching: base.Real | None = Field(
         description="Probability that the end of life is reached by the horizon"
     )
     model: life.ModelName = Field(description="The model that the clutch is tracked under")
     ended: life.DeclaredEnd | None = Field(description="The declared end of the present life; null while it goes on")
+    at_least_at: life.AtLeastAt
+    counted_from: life.CountedFrom
+    held_runs: life.Held
+    statement: life.Statement
 
 
 class LastRun(base.Answer):
@@ -188,7 +188,7 @@ class Recent(base.Answer):
     """The recent history of a clutch."""
 
     last_run: LastRun = Field(description="The run that was made last")
-    mean_cof: list[float] = Field(description="Mean COF of the present life, thinned to at most 32 values")
+    mean_cof: list[base.Real] = Field(description="Mean COF of the present life, thinned to at most 32 values")
 
 
 class AdvisedTest(base.Answer):
@@ -250,6 +250,7 @@ class ClutchOut(base.Answer):
     diagnosis: LatestDiagnosis | None = Field(description="The newest finished diagnosis; null without one")
 
 
-ClutchPage = base.page_of(
-    "ClutchPage", ClutchOut, "Clutches, the lowest safe bound first or by name.", "The clutches of this page"
-)
+class ClutchPage(base.Page[ClutchOut]):
+    """Clutches, the lowest safe bound first or by name."""
+
+    items: list[ClutchOut] = Field(description="The clutches of this page")

@@ -7,9 +7,9 @@ from pydantic import Field, StringConstraints, model_validator
 from service.api import base
 from service.api.life import ModelName
 
-Number = float | None
-Numbers = list[float | None]
-Table = list[list[float | None]]
+Number = base.Real | None
+Numbers = list[base.Real | None]
+Table = list[list[base.Real | None]]
 JobState = Literal["waiting", "running", "finished", "failed", "cancelled"]
 DiagnosisName = Annotated[str, Field(description="The diagnosis' name")]
 
@@ -139,8 +139,8 @@ class PlanStep(base.Answer):
     """One test of a plan."""
 
     kind: str = Field(description="`stationary_stribeck` or `dynamic_stribeck`")
-    pressures_bar: list[float] = Field(description="Line pressures in the order in which they are set, bar")
-    speeds_rpm: list[float] = Field(
+    pressures_bar: list[base.Real] = Field(description="Line pressures in the order in which they are set, bar")
+    speeds_rpm: list[base.Real] = Field(
         description="Speeds in the order in which they are set, rpm; for a dynamic test the lowest and the highest"
     )
     frequency_hz: Number = Field(description="Frequency of the speed of a dynamic test, Hz; else null")
@@ -198,9 +198,9 @@ class IsolabilityOut(base.Answer):
 class Axes(base.Answer):
     """The axes of the residual maps."""
 
-    pressure_bar: list[float] = Field(description="Line pressure, bar")
-    speed_rpm: list[float] = Field(description="Sliding speed, rpm")
-    cycles: list[float] = Field(description="Duty cycles since new")
+    pressure_bar: list[base.Real] = Field(description="Line pressure, bar")
+    speed_rpm: list[base.Real] = Field(description="Sliding speed, rpm")
+    cycles: list[base.Real] = Field(description="Duty cycles since new")
 
 
 class ResidualMap(base.Answer):
@@ -221,8 +221,8 @@ class MapsOut(base.Answer):
 class LoopTraceOut(base.Answer):
     """A friction loop over one period: measured, and of both models."""
 
-    pressure_bar: float = Field(description="Line pressure, bar")
-    cycles: float = Field(description="Duty cycles since new")
+    pressure_bar: base.Real = Field(description="Line pressure, bar")
+    cycles: base.Real = Field(description="Duty cycles since new")
     frequency_hz: Number = Field(description="Frequency of the speed, Hz")
     speed_rpm: Numbers = Field(description="Sliding speed, rpm")
     measured_nm: Numbers = Field(description="Measured torque, Nm")
@@ -245,9 +245,6 @@ class DiagnosisListed(base.Answer):
     stale: bool = Field(description="Whether runs were posted since")
     earlier_life: bool = Field(description="Whether a rebuild has ended the life that it diagnosed")
     adoptable: bool = Field(description="Whether it has an extended model to adopt")
-    not_adoptable: str | None = Field(
-        default=None, description="Why a fitted cause cannot be adopted; null if it can, or if none was fitted"
-    )
     adopted: bool = Field(description="Whether its model is the current one")
     problem: str | None = Field(description="Why it failed")
     code_version: str = Field(description="The release that computed it")
@@ -267,6 +264,9 @@ class DiagnosisListed(base.Answer):
     gain: GainOut = Field(description="What the extended model gains on runs that were left out of the fit")
     advice: list[AdviceOut] = Field(description="Tests that would distinguish the remaining explanations")
     visible: list[VisibleOut] = Field(description="The smallest amplitude of each effect that these data would show")
+    not_adoptable: str | None = Field(
+        default=None, description="Why a fitted cause cannot be adopted; null if it can, or if none was fitted"
+    )
     notes: list[str] = Field(description="Assumptions and omissions")
     statistics: dict[str, Number] = Field(description="Numbers of the computation, by name")
 
@@ -281,7 +281,10 @@ class DiagnosisOut(DiagnosisListed):
     )
 
 
-DiagnosisPage = base.page_of("DiagnosisPage", DiagnosisListed, "Diagnoses, newest first.", "The diagnoses of this page")
+class DiagnosisPage(base.Page[DiagnosisListed]):
+    """Diagnoses, newest first."""
+
+    items: list[DiagnosisListed] = Field(description="The diagnoses of this page")
 
 
 class ModelVersion(base.Answer):
@@ -341,9 +344,9 @@ class LeftClutch(base.Answer):
 class JobResult(base.Answer):
     """The result of a replay or a fleet refresh."""
 
-    replayed: int | None = Field(default=None, description="Clutches whose results were recomputed, of a replay")
     kinds: int | None = Field(default=None, description="Kinds that have a new version of their prior, of a refresh")
     changed: int | None = Field(default=None, description="Clutches whose predictions have changed, of a refresh")
+    replayed: int | None = Field(default=None, description="Clutches whose results were recomputed, of a replay")
     left: int = Field(description="Clutches that keep their former results")
     reasons: list[LeftClutch] = Field(description="The reasons, for the first 20 of them")
 
@@ -367,4 +370,7 @@ class JobOut(base.Answer):
     result: JobResult | None = Field(description="Its result; null before its end, and for a diagnosis")
 
 
-JobPage = base.page_of("JobPage", JobOut, "A page of jobs, newest first.", "The jobs")
+class JobPage(base.Page[JobOut]):
+    """A page of jobs, newest first."""
+
+    items: list[JobOut] = Field(description="The jobs")

@@ -2,7 +2,7 @@
 
 from pydantic import Field
 
-from service.api.base import Answer, ClutchName, Next, Origin, Revision, page_of
+from service.api.base import Answer, ClutchName, Next, Origin, Page, Real, Revision
 from service.api.life import Method, Model, Prior, Quantiles, SeverityUsed
 
 
@@ -19,15 +19,15 @@ class Kind(Answer):
 class Share(Answer):
     """Δ over ξ0 among the clutches of a fleet."""
 
-    median: float = Field(description="Median")
-    sd: float = Field(description="Standard deviation")
+    median: Real = Field(description="Median")
+    sd: Real = Field(description="Standard deviation")
 
 
 class Factor(Answer):
     """A positive coefficient among the clutches of a fleet."""
 
-    median: float = Field(description="Median")
-    log_sd: float = Field(description="Standard deviation of its logarithm")
+    median: Real = Field(description="Median")
+    log_sd: Real = Field(description="Standard deviation of its logarithm")
 
 
 class Population(Answer):
@@ -42,8 +42,8 @@ class Population(Answer):
 class SeverityEstimate(Answer):
     """The exponent of a duty cycle's energy, estimated from ended lives."""
 
-    value: float = Field(description="Estimate")
-    sd: float = Field(description="Its standard deviation")
+    value: Real = Field(description="Estimate")
+    sd: Real = Field(description="Its standard deviation")
 
 
 class FleetPriorOut(Answer):
@@ -62,47 +62,48 @@ class FleetPriorOut(Answer):
     )
 
 
-FleetPriorPage = page_of(
-    "FleetPriorPage", FleetPriorOut, "The newest version of every kind's prior.", "The priors of this page"
-)
+class FleetPriorPage(Page[FleetPriorOut]):
+    """The newest version of every kind's prior."""
+
+    items: list[FleetPriorOut] = Field(description="The priors of this page")
 
 
 class ScoreSummary(Answer):
     """Means over predictions; null without any."""
 
     predictions: int = Field(description="Number of predictions")
-    crps_share: float | None = Field(description="Continuous ranked probability score, as a share of the whole life")
-    interval_share: float | None = Field(description="Width of the 5 to 95 % interval, as a share of the whole life")
-    coverage: float | None = Field(description="Share of 5 to 95 % intervals that hold the truth; nominally 0.9")
-    alpha_lambda: float | None = Field(description="Share of medians within 20 % of the true remaining life")
+    crps_share: Real | None = Field(description="Continuous ranked probability score, as a share of the whole life")
+    interval_share: Real | None = Field(description="Width of the 5 to 95 % interval, as a share of the whole life")
+    coverage: Real | None = Field(description="Share of 5 to 95 % intervals that hold the truth; nominally 0.9")
+    alpha_lambda: Real | None = Field(description="Share of medians within 20 % of the true remaining life")
 
 
 class ScoredPrediction(Answer):
     """The prediction at one test, and its scores."""
 
-    cycles: float = Field(description="Duty cycles since new at the test")
+    cycles: Real = Field(description="Duty cycles since new at the test")
     runs_used: int = Field(description="Number of stationary tests that the prediction uses")
-    share_of_life: float = Field(description="Share of the whole life at the test")
-    true_remaining_cycles: float = Field(description="True remaining duty cycles")
+    share_of_life: Real = Field(description="Share of the whole life at the test")
+    true_remaining_cycles: Real = Field(description="True remaining duty cycles")
     remaining_cycles: Quantiles = Field(description="Quantiles of the remaining duty cycles as predicted")
-    crps_cycles: float = Field(description="Continuous ranked probability score, duty cycles")
-    crps_share: float = Field(description="The same as a share of the whole life")
-    interval_share: float = Field(description="Width of the 5 to 95 % interval, as a share of the whole life")
+    crps_cycles: Real = Field(description="Continuous ranked probability score, duty cycles")
+    crps_share: Real = Field(description="The same as a share of the whole life")
+    interval_share: Real = Field(description="Width of the 5 to 95 % interval, as a share of the whole life")
     covered: bool = Field(description="Whether the 5 to 95 % interval holds the truth")
-    pit: float = Field(description="Predicted probability that the life is at most as long as it was")
+    pit: Real = Field(description="Predicted probability that the life is at most as long as it was")
     alpha_lambda: bool = Field(description="Whether the median is within 20 % of the true remaining life")
 
 
 class ScoredLife(Answer):
     """A life that has ended."""
 
-    origin_cycles: float = Field(description="Duty cycles since new at its start")
-    end_of_life_cycles: float = Field(description="Duty cycles since new at its end")
-    prognostic_horizon_cycles: float | None = Field(
+    origin_cycles: Real = Field(description="Duty cycles since new at its start")
+    end_of_life_cycles: Real = Field(description="Duty cycles since new at its end")
+    prognostic_horizon_cycles: Real | None = Field(
         description="Remaining life from which on all medians were within 10 % of the whole life; null if none was"
     )
     summary: ScoreSummary = Field(description="Means over its predictions")
-    pit_histogram: list[float] = Field(description="Shares of predictions in ten equal bins of `pit`")
+    pit_histogram: list[Real] = Field(description="Shares of predictions in ten equal bins of `pit`")
     predictions: list[ScoredPrediction] = Field(description="Its predictions, by cycles")
     model: Model
     prior: Prior
@@ -123,14 +124,18 @@ class EndedLife(Answer):
     """A life that was scored."""
 
     clutch_id: ClutchName
-    origin_cycles: float = Field(description="Duty cycles since new at its start")
-    end_of_life_cycles: float = Field(description="Duty cycles since new at its end")
+    origin_cycles: Real = Field(description="Duty cycles since new at its start")
+    end_of_life_cycles: Real = Field(description="Duty cycles since new at its end")
 
 
-class StageSummary(ScoreSummary):
+class Stage(Answer):
+    """A stage of life."""
+
+    share_of_life: Real = Field(description="The middle of the stage, as a share of the whole life")
+
+
+class StageSummary(ScoreSummary, Stage):
     """Means over predictions at one stage of life."""
-
-    share_of_life: float = Field(description="The middle of the stage, as a share of the whole life")
 
 
 class FleetScores(Answer):
@@ -140,7 +145,7 @@ class FleetScores(Answer):
     lives: list[EndedLife] = Field(description="The lives that were scored")
     overall: ScoreSummary = Field(description="Means over all predictions")
     stages: list[StageSummary] = Field(description="Means by stage of life")
-    pit_histogram: list[float] = Field(description="Shares of predictions in ten equal bins of `pit`")
+    pit_histogram: list[Real] = Field(description="Shares of predictions in ten equal bins of `pit`")
 
 
 class StateCounts(Answer):
@@ -160,7 +165,7 @@ class FleetTotals(Answer):
     archived: int = Field(description="Archived clutches")
     held: int = Field(description="Those of `all` that have runs that are held")
     states: StateCounts = Field(description="Those of `all` by their states")
-    scale_cycles: float = Field(
+    scale_cycles: Real = Field(
         description="End of the common scale for bars of remaining cycles (1, 2 or 5 times a power of ten). Nine "
         "of ten clutches with a prediction lie below it"
     )

@@ -5,7 +5,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, StringConstraints, model_validator
 
 from service.api import base
-from service.api.base import Answer, ClutchName, Cycles, Origin, PositiveNumber, Schema, StartedAt, page_of
+from service.api.base import Answer, ClutchName, Cycles, Origin, Page, PositiveNumber, Real, Schema, StartedAt
 
 Skewness = Annotated[
     float, Field(ge=-base.LARGEST_SKEWNESS, le=base.LARGEST_SKEWNESS, allow_inf_nan=False, strict=True)
@@ -58,11 +58,11 @@ class InspectionOut(Answer):
 
     clutch_id: ClutchName
     inspection_id: str = Field(description="The inspection's name; it derives from its content")
-    cycles: float = Field(description="Duty cycles since new when the surface was inspected")
+    cycles: Real = Field(description="Duty cycles since new when the surface was inspected")
     performed_at: str | None = Field(description="When it was inspected, ISO 8601; null if not stated")
     lining: str = Field(description="The disc, its side, or the place on its lining; empty if not stated")
-    roughness_um: float | None = Field(description="Arithmetic mean roughness R_a, µm; null if not measured")
-    skewness: float | None = Field(description="Skewness R_sk of the surface profile; null if not measured")
+    roughness_um: Real | None = Field(description="Arithmetic mean roughness R_a, µm; null if not measured")
+    skewness: Real | None = Field(description="Skewness R_sk of the surface profile; null if not measured")
     note: str = Field(description="The remark")
     origin: Origin
     content_sha256: str = Field(description="Hash of what was posted")
@@ -73,4 +73,7 @@ class InspectionOut(Answer):
     photographs: list[PhotographOut] = Field(description="Its photographs, in the order in which they came")
 
 
-InspectionPage = page_of("InspectionPage", InspectionOut, "Inspections by cycles.", "The inspections of this page")
+class InspectionPage(Page[InspectionOut]):
+    """Inspections by cycles."""
+
+    items: list[InspectionOut] = Field(description="The inspections of this page")

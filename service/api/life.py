@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, Self, get_args
 from pydantic import Field, model_validator
 
 from service.api import base
-from service.api.base import Answer, ClutchName, NotNegativeNumber, Origin, PositiveNumber, Revision, Schema
+from service.api.base import Answer, ClutchName, NotNegativeNumber, Origin, PositiveNumber, Real, Revision, Schema
 from service.api.run import EndReason, Warned
 
 ParameterQuantity = Literal["static_torque_nm", "coulomb_ratio", "stribeck_velocity_m_s", "viscous_coefficient"]
@@ -97,45 +97,60 @@ Method = Annotated[
     Field(description="The filter: Rao-Blackwellised particles, unscented Kalman filter, or exact posterior on a grid"),
 ]
 #: By probability, as text: "0.05", ..., "0.95"; null beyond the horizon or where nothing is predicted.
-Quantiles = dict[str, float | None]
+Quantiles = dict[str, Real | None]
 
 
-class CriterionPlace(Answer):
-    """A quantity, where it applies, and its limit."""
-
-    quantity: QuantityName = Field(description="The quantity that is compared with the limit")
-    fraction: float | None = Field(description="Limit over initial value; null where the limit is a value")
-    below: float | None = Field(default=None, description="The value below which the life ends")
-    above: float | None = Field(default=None, description="The value above which the life ends")
-    pressure_bar: float | None = Field(description="Line pressure, bar; null: the mean over the reference pressures")
-    speed_rpm: float | None = Field(default=None, description="Speed of a slope, rpm")
-    frequency_hz: float | None = Field(default=None, description="Frequency of a quantity of loops, Hz")
-    initial: float | None = Field(default=None, description="The quantity when new, as tracked")
-    limit: float | None = Field(default=None, description="The value of the quantity that ends the life")
+_Limited = Annotated[QuantityName, Field(description="The quantity that is compared with the limit")]
+_Fraction = Annotated[Real | None, Field(description="Limit over initial value; null where the limit is a value")]
+_Below = Annotated[Real | None, Field(description="The value below which the life ends")]
+_Above = Annotated[Real | None, Field(description="The value above which the life ends")]
+_Pressure = Annotated[Real | None, Field(description="Line pressure, bar; null: the mean over the reference pressures")]
+_Speed = Annotated[Real | None, Field(description="Speed of a slope, rpm")]
+_Frequency = Annotated[Real | None, Field(description="Frequency of a quantity of loops, Hz")]
+_Initial = Annotated[Real | None, Field(description="The quantity when new, as tracked")]
+_LimitValue = Annotated[Real | None, Field(description="The value of the quantity that ends the life")]
 
 
-class Criterion(CriterionPlace):
+class Criterion(Answer):
     """The criterion that will most probably end the life; null before the first measurement."""
 
-    initial_mean_cof: float | None = Field(description="Mean COF when new, as tracked; null for other quantities")
-    threshold_mean_cof: float | None = Field(description="Mean COF at the end of life; null for other quantities")
+    quantity: _Limited
+    fraction: _Fraction
+    below: _Below = None
+    above: _Above = None
+    initial: _Initial = None
+    limit: _LimitValue = None
+    initial_mean_cof: Real | None = Field(description="Mean COF when new, as tracked; null for other quantities")
+    threshold_mean_cof: Real | None = Field(description="Mean COF at the end of life; null for other quantities")
+    pressure_bar: _Pressure
+    speed_rpm: _Speed = None
+    frequency_hz: _Frequency = None
 
 
 class CriterionValue(Answer):
     """The present value of a quantity; with too few tests the last measured value, or null."""
 
-    value: float | None = Field(description="Its mean, as tracked")
-    sd: float | None = Field(description="Its standard deviation")
+    value: Real | None = Field(description="Its mean, as tracked")
+    sd: Real | None = Field(description="Its standard deviation")
 
 
-class CriterionOutcome(CriterionPlace):
+class CriterionOutcome(Answer):
     """One of the criteria: when it would end the life by itself, and the probability that it is reached first."""
 
-    current: CriterionValue = Field(description="The present value of the quantity")
-    remaining_cycles: Quantiles = Field(description="Quantiles of the remaining duty cycles, by probability")
+    quantity: _Limited
+    pressure_bar: _Pressure
+    speed_rpm: _Speed = None
+    frequency_hz: _Frequency = None
+    fraction: _Fraction
+    below: _Below = None
+    above: _Above = None
+    initial: _Initial = None
+    limit: _LimitValue = None
     end_of_life_cycles: Quantiles = Field(description="Quantiles of the duty cycles since new at its limit")
-    probability_of_reaching: float | None = Field(description="Probability that the limit is reached by the horizon")
-    probability_first: float = Field(description="Probability that this limit is reached before the others")
+    remaining_cycles: Quantiles = Field(description="Quantiles of the remaining duty cycles, by probability")
+    probability_of_reaching: Real | None = Field(description="Probability that the limit is reached by the horizon")
+    current: CriterionValue = Field(description="The present value of the quantity")
+    probability_first: Real = Field(description="Probability that this limit is reached before the others")
     tests: int = Field(description="Number of tests that measured the quantity there")
 
 
@@ -144,7 +159,7 @@ class LifeNumber(Answer):
 
     number: int = Field(description="Its number, from 1 on")
     of: int = Field(description="How many lives the clutch has had")
-    from_cycles: float | None = Field(description="Duty cycles since new at which it began; null before the first run")
+    from_cycles: Real | None = Field(description="Duty cycles since new at which it began; null before the first run")
     rebuild: str | None = Field(description="The run_id of the rebuild that began it; null for the first")
 
 
@@ -153,11 +168,11 @@ class Current(Answer):
     measured mean COF.
     """
 
-    mean_cof: float | None = Field(description="Mean COF, as tracked")
-    mean_cof_sd: float | None = Field(description="Its standard deviation")
-    measured_at_cycles: float | None = Field(description="Duty cycles since new at which it was measured last")
-    fraction_of_initial: float | None = Field(description="Mean COF over its value when new")
-    health: float | None = Field(
+    mean_cof: Real | None = Field(description="Mean COF, as tracked")
+    mean_cof_sd: Real | None = Field(description="Its standard deviation")
+    measured_at_cycles: Real | None = Field(description="Duty cycles since new at which it was measured last")
+    fraction_of_initial: Real | None = Field(description="Mean COF over its value when new")
+    health: Real | None = Field(
         description="Remaining share of the way to the limit, for the worst criterion: 1 when new, 0 at the end of life"
     )
 
@@ -185,7 +200,7 @@ class SeverityName(Answer):
     basis: Literal["cycles", "sliding_distance", "dissipated_energy"] = Field(
         description="What eq. 6 counts: duty cycles, sliding distance or dissipated energy"
     )
-    exponent: float = Field(description="Exponent of a duty cycle's distance or energy")
+    exponent: Real = Field(description="Exponent of a duty cycle's distance or energy")
 
 
 Model = Annotated[ModelName, Field(description="The model that the answer was computed with")]
@@ -199,8 +214,8 @@ class CourseShare(Answer):
     name: Literal["eq6", "slowing", "accelerating"] = Field(
         description="`eq6` (order above 1), `slowing` in another way, or `accelerating`"
     )
-    probability: float = Field(description="Its probability")
-    order: float | None = Field(description="The median of its order n; null for a logarithm alone")
+    probability: Real = Field(description="Its probability")
+    order: Real | None = Field(description="The median of its order n; null for a logarithm alone")
 
 
 class BackCastCount(Answer):
@@ -208,7 +223,7 @@ class BackCastCount(Answer):
 
     held: int = Field(description="Number of tests within the 90 % interval of their forecast")
     of: int = Field(description="Number of tests with an earlier forecast")
-    widening: float = Field(
+    widening: Real = Field(
         description="How much the interval was widened because earlier forecasts missed (exponent of remaining "
         "life over its median); 1: not at all"
     )
@@ -217,7 +232,7 @@ class BackCastCount(Answer):
 class SampleQuality(Answer):
     """The weighted draws that a prediction is made of."""
 
-    effective_draws: float = Field(description="Effective number of draws")
+    effective_draws: Real = Field(description="Effective number of draws")
     status: Literal["sound", "few_draws"] = Field(
         description="`few_draws`: fewer than 100 draws count, the outer quantiles are rough; compare with `grid`"
     )
@@ -239,7 +254,7 @@ class HeldRuns(Answer):
 
 #: The safe bound.
 AtLeast = Annotated[
-    float | None,
+    Real | None,
     Field(
         description="Safe bound: with a probability of 95 % the clutch lasts this number of duty cycles or more. The "
         "lower of the values with and without held runs, at most up to the horizon; null before the "
@@ -266,39 +281,32 @@ Held = Annotated[
 Statement = Annotated[str, Field(description="The remaining life in a sentence")]
 
 
+Status = Literal["predicted", "reached", "may_never_reach", "insufficient_data", "ended"]
+
+
 class DeclaredEnd(Answer):
     """The declared end of a life (maintenance with the event `end_of_life`)."""
 
-    cycles: float = Field(description="Duty cycles since new at the end")
+    cycles: Real = Field(description="Duty cycles since new at the end")
     reason: EndReason = Field(description="`worn`: nothing remains; `other`: it was taken out before its end")
     run_id: str = Field(description="The run that declares it; if you withdraw this run, the life goes on")
 
 
-class RemainingLife(Answer):
-    """The remaining duty cycles until mean COF has fallen to the criterion's fraction of its initial value."""
+class LifePrediction(Answer):
+    """What is predicted of a life at some cycles; stored after every run."""
 
-    clutch_id: ClutchName
-    method: Method
-    as_of_cycles: float | None = Field(description="Duty cycles since new at which the remaining cycles begin")
+    as_of_cycles: Real | None = Field(description="Duty cycles since new at which the remaining cycles begin")
     runs_used: int = Field(description="Number of stationary tests that the prediction uses")
-    revision: Revision
-    status: Literal["predicted", "reached", "may_never_reach", "insufficient_data", "ended"] = Field(
+    status: Status = Field(
         description="`predicted`; `reached` (more likely than not); `may_never_reach` (a quantile lies beyond the"
         " horizon); `insufficient_data`; `ended` (declared)"
     )
-    ended: DeclaredEnd | None = Field(default=None, description="The declared end of the life; null while it goes on")
     criterion: Criterion = Field(description="The end-of-life criterion")
     current: Current = Field(description="The clutch's present state")
     remaining_cycles: Quantiles = Field(description="Quantiles of the remaining duty cycles, by probability")
     end_of_life_cycles: Quantiles = Field(description="Quantiles of the duty cycles since new at the end of life")
     at_least: AtLeast
-    at_least_at: AtLeastAt
-    counted_from: CountedFrom
-    held_runs: Held
-    statement: Statement
-    probability_of_reaching: float | None = Field(
-        description="Probability that the threshold is reached by the horizon"
-    )
+    probability_of_reaching: Real | None = Field(description="Probability that the threshold is reached by the horizon")
     course: Course | None = Field(
         default=None,
         description="The most probable course of mean COF; null without a prediction or a criterion on mean COF",
@@ -309,24 +317,42 @@ class RemainingLife(Answer):
     ended_lives: int = Field(
         default=0, description="Number of ended lives of the same kind that calibrated the predicted end"
     )
+    ended: DeclaredEnd | None = Field(default=None, description="The declared end of the life; null while it goes on")
     sample: SampleQuality | None = Field(
         default=None, description="The draws behind the prediction; null without a prediction"
     )
-    criteria: list[CriterionOutcome] = Field(
-        default=[], description="All criteria, each with its own end and the probability of being reached first"
-    )
-    life: LifeNumber | None = Field(
-        default=None, description="The life that the answer concerns, if a life or criterion was requested"
-    )
-    horizon_cycles: float = Field(
+    horizon_cycles: Real = Field(
         description="The prediction goes no further than this many duty cycles since new: a million, or ten times "
         "its age if that is more"
     )
+    warnings: list[Warned] = Field(description="Warnings, such as a last test far off its prediction")
     model: Model
     prior: Prior
     severity: SeverityUsed
-    warnings: list[Warned] = Field(description="Warnings, such as a last test far off its prediction")
+
+
+class PredictionOf(Answer):
+    """Of which clutch a prediction is, and by which filter."""
+
+    clutch_id: ClutchName
+    method: Method
+    revision: Revision
     origin: Origin
+
+
+class RemainingLife(LifePrediction, PredictionOf):
+    """The remaining duty cycles until mean COF has fallen to the criterion's fraction of its initial value."""
+
+    life: LifeNumber | None = Field(
+        default=None, description="The life that the answer concerns, if a life or criterion was requested"
+    )
+    at_least_at: AtLeastAt
+    counted_from: CountedFrom
+    held_runs: Held
+    statement: Statement
+    criteria: list[CriterionOutcome] = Field(
+        default=[], description="All criteria, each with its own end and the probability of being reached first"
+    )
 
 
 class PlannedBlock(Schema):
@@ -386,7 +412,7 @@ class PlannedLife(RemainingLife):
     remaining_blocks: Quantiles = Field(
         description="Quantiles of the blocks until the end, the last one in part; the programme begins again after its last"
     )
-    block_severity: list[float | None] = Field(
+    block_severity: list[Real | None] = Field(
         description="Cycles of recent duty that one cycle of each block is worth (median); null without a prediction"
     )
     end_of_life_at: dict[str, str | None] | None = Field(
@@ -395,7 +421,7 @@ class PlannedLife(RemainingLife):
     counted_by: Literal["cycles", "sliding_distance", "dissipated_energy"] = Field(
         description="What a planned cycle was counted by"
     )
-    pace_cycles_per_hour: float | None = Field(description="Duty cycles per hour, from which the dates were computed")
+    pace_cycles_per_hour: Real | None = Field(description="Duty cycles per hour, from which the dates were computed")
     pace_from: Literal["request", "runs"] | None = Field(
         description="Origin of the pace: the request, or the dated runs of the present life"
     )

@@ -1,36 +1,33 @@
 """What is answered along a life: Stribeck curves, friction loops and series; eq. 6; engagements measured and simulated."""
 
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
-from service.api.base import Answer, ClutchName, Next, Origin, Revision, RunCycles, RunName, page_of
+from service.api.base import Answer, ClutchName, Next, Origin, Page, Real, Revision, RunCycles, RunName
 from service.api.life import LifeNumber, MethodName, Model, Prior, Quantiles, SeverityUsed
 from service.api.run import Fit, IndicatorEstimate, Indicators, Loop, Warned
 
-
-class WithoutHeld(Answer):
-    """What an answer that follows from the accepted runs says of those that are held."""
-
-    held_runs: int = Field(description="Number of runs that are held: the answer is without them")
-    warnings: list[Warned] = Field(description="Warnings, such as tracks that disagree or runs that are held")
+#: What an answer that follows from the accepted runs says of those that are held.
+HeldLeftOut = Annotated[int, Field(description="Number of runs that are held: the answer is without them")]
+Warnings = Annotated[list[Warned], Field(description="Warnings, such as tracks that disagree or runs that are held")]
 
 
 class LinearLaw(Answer):
     """value = intercept + slope · pressure_bar."""
 
-    intercept: float = Field(description="Value at zero pressure")
-    slope_per_bar: float = Field(description="Change per bar")
-    covariance: list[list[float]] = Field(description="Covariance of `intercept` and `slope_per_bar`, in this order")
+    intercept: Real = Field(description="Value at zero pressure")
+    slope_per_bar: Real = Field(description="Change per bar")
+    covariance: list[list[Real]] = Field(description="Covariance of `intercept` and `slope_per_bar`, in this order")
 
 
 class AsymptoticLaw(Answer):
     """value = asymptote + excess · exp(-pressure_bar / decay_bar)."""
 
-    asymptote: float = Field(description="Value at high pressure")
-    excess: float = Field(description="Value at zero pressure minus the asymptote")
-    decay_bar: float = Field(description="Pressure over which the excess falls to 1/e, bar")
-    covariance: list[list[float]] = Field(
+    asymptote: Real = Field(description="Value at high pressure")
+    excess: Real = Field(description="Value at zero pressure minus the asymptote")
+    decay_bar: Real = Field(description="Pressure over which the excess falls to 1/e, bar")
+    covariance: list[list[Real]] = Field(
         description="Covariance of `asymptote`, `excess` and `decay_bar`, in this order; 0 of what is held at 0"
     )
 
@@ -53,57 +50,72 @@ class StribeckItem(Answer):
     pressure_laws: PressureLawsOut | None = Field(description="The pressure laws; null with too few pressures")
 
 
-StribeckPage = page_of(
-    "StribeckPage", StribeckItem, "Stationary tests by cycles.", "The tests of this page", base=WithoutHeld
-)
+class StribeckPage(Answer):
+    """Stationary tests by cycles."""
+
+    held_runs: HeldLeftOut
+    warnings: Warnings
+    items: list[StribeckItem] = Field(description="The tests of this page")
+    next: Next
 
 
-class LoopItem(Loop):
-    """A friction loop of one dynamic test at one pressure."""
+class OfRun(Answer):
+    """What belongs to a run."""
 
     run_id: RunName
     cycles: RunCycles
 
 
-LoopPage = page_of(
-    "LoopPage", LoopItem, "Friction loops by cycles and pressure.", "The loops of this page", base=WithoutHeld
-)
+class LoopItem(Loop, OfRun):
+    """A friction loop of one dynamic test at one pressure."""
+
+
+class LoopPage(Answer):
+    """Friction loops by cycles and pressure."""
+
+    held_runs: HeldLeftOut
+    warnings: Warnings
+    items: list[LoopItem] = Field(description="The loops of this page")
+    next: Next
 
 
 class SeriesItem(Answer):
     """One value of one quantity."""
 
-    cycles: float = Field(description="Duty cycles since new")
+    cycles: Real = Field(description="Duty cycles since new")
     time: str | None = Field(
         description="When the run was started, or received if that is unknown, ISO 8601; null for predictions"
     )
     run_id: str | None = Field(description="The run's name; null for predictions")
+    source: Literal["run", "track"] = Field(
+        description="`run`: from one run alone; `track`: from all runs up to these cycles"
+    )
+    pressure_bar: Real | None = Field(
+        description="Line pressure, bar; null: the mean over the reference pressures, or an engagement"
+    )
+    frequency_hz: Real | None = Field(description="Frequency of a friction loop, Hz, to two digits; null for all else")
+    speed_rpm: Real | None = Field(description="Speed of a slope, rpm; null for all else")
     quantity: str = Field(
         description="A fitted quantity, the slope dμ/dv of a curve, one of a friction loop, an indicator of an "
         "engagement, or one of the prediction at these cycles"
     )
     unit: str = Field(description="Its unit")
-    pressure_bar: float | None = Field(
-        description="Line pressure, bar; null: the mean over the reference pressures, or an engagement"
-    )
-    value: float | None = Field(description="The value; the median of a prediction")
-    lower: float | None = Field(description="5 % quantile")
-    upper: float | None = Field(description="95 % quantile")
-    frequency_hz: float | None = Field(description="Frequency of a friction loop, Hz, to two digits; null for all else")
-    speed_rpm: float | None = Field(description="Speed of a slope, rpm; null for all else")
-    source: Literal["run", "track"] = Field(
-        description="`run`: from one run alone; `track`: from all runs up to these cycles"
-    )
+    value: Real | None = Field(description="The value; the median of a prediction")
+    lower: Real | None = Field(description="5 % quantile")
+    upper: Real | None = Field(description="95 % quantile")
 
 
-SeriesPage = page_of("SeriesPage", SeriesItem, "Flat rows for dashboards and spreadsheets.", "The rows of this page")
+class SeriesPage(Page[SeriesItem]):
+    """Flat rows for dashboards and spreadsheets."""
+
+    items: list[SeriesItem] = Field(description="The rows of this page")
 
 
 class Estimate(Answer):
     """The posterior of a coefficient."""
 
-    value: float = Field(description="Posterior mean")
-    sd: float = Field(description="Posterior standard deviation")
+    value: Real = Field(description="Posterior mean")
+    sd: Real = Field(description="Posterior standard deviation")
     quantiles: Quantiles = Field(description="Posterior quantiles, by probability")
 
 
@@ -119,27 +131,27 @@ class Coefficients(Answer):
 class CoefficientDraws(Answer):
     """Joint draws of the coefficients of eq. 6, of equal weight. The same row of all four columns is one draw."""
 
-    initial: list[float] = Field(description="Initial value ξ0, in the quantity's unit")
-    change: list[float] = Field(description="Change Δ, in the quantity's unit")
-    scale_cycles: list[float] = Field(description="Scale φ, duty cycles")
-    exponent: list[float] = Field(description="Exponent ε")
+    initial: list[Real] = Field(description="Initial value ξ0, in the quantity's unit")
+    change: list[Real] = Field(description="Change Δ, in the quantity's unit")
+    scale_cycles: list[Real] = Field(description="Scale φ, duty cycles")
+    exponent: list[Real] = Field(description="Exponent ε")
 
 
 class Measured(Answer):
     """The fitted values of the tests, by cycles."""
 
-    cycles: list[float] = Field(description="Duty cycles since new")
-    value: list[float] = Field(description="Fitted value, in the quantity's unit")
-    sd: list[float] = Field(description="Its standard deviation")
+    cycles: list[Real] = Field(description="Duty cycles since new")
+    value: list[Real] = Field(description="Fitted value, in the quantity's unit")
+    sd: list[Real] = Field(description="Its standard deviation")
 
 
 class Trajectory(Answer):
     """A tracked quantity over cycles."""
 
-    cycles: list[float] = Field(description="Duty cycles since new")
-    median: list[float] = Field(description="Posterior median")
-    lower: list[float] = Field(description="5 % quantile")
-    upper: list[float] = Field(description="95 % quantile")
+    cycles: list[Real] = Field(description="Duty cycles since new")
+    lower: list[Real] = Field(description="5 % quantile")
+    median: list[Real] = Field(description="Posterior median")
+    upper: list[Real] = Field(description="95 % quantile")
 
 
 class DegradationItem(Answer):
@@ -147,17 +159,17 @@ class DegradationItem(Answer):
 
     quantity: str = Field(description="A Stribeck parameter, `mean_cof`, `slope`, or a quantity of the lag")
     unit: str = Field(description="Its unit")
-    pressure_bar: float | None = Field(description="Line pressure, bar; null: the mean over the reference pressures")
-    speed_rpm: float | None = Field(description="Speed of a slope, rpm; null for all else")
-    frequency_hz: float | None = Field(description="Frequency of a friction loop, Hz; null for all else")
+    pressure_bar: Real | None = Field(description="Line pressure, bar; null: the mean over the reference pressures")
+    speed_rpm: Real | None = Field(description="Speed of a slope, rpm; null for all else")
+    frequency_hz: Real | None = Field(description="Frequency of a friction loop, Hz; null for all else")
     coefficients: Coefficients | None = Field(
         description="The coefficients of eq. 6; null if the quantity surely does not follow eq. 6, with too few "
         "tests, and for a slope, which follows from the parameters"
     )
-    correlations: list[list[float]] | None = Field(
+    correlations: list[list[Real]] | None = Field(
         description="Correlations of ξ0, Δ, log φ and log ε, in this order; null without coefficients"
     )
-    eq6_probability: float | None = Field(
+    eq6_probability: Real | None = Field(
         description="Probability that the quantity follows eq. 6; null for a slope and with too few tests"
     )
     draws: CoefficientDraws | None = Field(description="Joint draws of the coefficients, if `draws` requested them")
@@ -168,8 +180,8 @@ class DegradationItem(Answer):
 class Disagreement(Answer):
     """COF from the parameters minus the direct track, in standard deviations of the difference."""
 
-    now_sd: float | None = Field(description="For the present value; null if it has no uncertainty")
-    end_of_life_sd: float | None = Field(description="For the median end of life; null beyond the horizon")
+    now_sd: Real | None = Field(description="For the present value; null if it has no uncertainty")
+    end_of_life_sd: Real | None = Field(description="For the median end of life; null beyond the horizon")
 
 
 class Rebuilt(Answer):
@@ -184,13 +196,13 @@ class SeverityWeighed(Answer):
     """Exponent by which the work of a duty cycle ages this clutch, estimated from the tests of a life with varying duty."""
 
     basis: str = Field(description="The work: `dissipated_energy` or `sliding_distance`")
-    exponents: list[float] = Field(description="The compared exponents; 0: every cycle ages the clutch equally")
-    probabilities: list[float] = Field(description="Probability of each exponent")
-    value: float = Field(description="Their mean")
-    sd: float = Field(description="Their standard deviation")
+    exponents: list[Real] = Field(description="The compared exponents; 0: every cycle ages the clutch equally")
+    probabilities: list[Real] = Field(description="Probability of each exponent")
+    value: Real = Field(description="Their mean")
+    sd: Real = Field(description="Their standard deviation")
 
 
-class Degradation(WithoutHeld):
+class Degradation(Answer):
     """Eq. 6 for every Stribeck parameter and for mean COF, or the track of one quantity."""
 
     clutch_id: ClutchName
@@ -203,6 +215,8 @@ class Degradation(WithoutHeld):
         description="The exponent of severity, estimated from the tests of this life; null if its duty states no "
         "work or hardly varies, with too few tests, or if one quantity was requested"
     )
+    held_runs: HeldLeftOut
+    warnings: Warnings
     model: Model
     prior: Prior
     severity: SeverityUsed
@@ -212,22 +226,24 @@ class Degradation(WithoutHeld):
 class SurfaceParameters(Answer):
     """The Stribeck parameters, one row per count of cycles, one column per pressure."""
 
-    static_torque_nm: list[list[float]] = Field(description="Static torque M_s, Nm")
-    coulomb_ratio: list[list[float]] = Field(description="Coulomb torque over static torque, M̄_c")
-    stribeck_velocity_m_s: list[list[float]] = Field(description="Stribeck velocity V_S, m/s")
-    viscous_coefficient: list[list[float]] = Field(description="Viscous coefficient C_v, Nm/(m/s)^0.3")
+    static_torque_nm: list[list[Real]] = Field(description="Static torque M_s, Nm")
+    coulomb_ratio: list[list[Real]] = Field(description="Coulomb torque over static torque, M̄_c")
+    stribeck_velocity_m_s: list[list[Real]] = Field(description="Stribeck velocity V_S, m/s")
+    viscous_coefficient: list[list[Real]] = Field(description="Viscous coefficient C_v, Nm/(m/s)^0.3")
 
 
-class Surfaces(WithoutHeld):
+class Surfaces(Answer):
     """The tracked Stribeck parameters over cycles and pressure (figs. 10, 11), and torque over speed too."""
 
     clutch_id: ClutchName
     revision: Revision
-    cycles: list[float] = Field(description="The axis of duty cycles since new")
-    pressure_bar: list[float] = Field(description="The axis of line pressure, bar")
-    speed_rpm: list[float] = Field(description="The axis of speed, rpm")
+    held_runs: HeldLeftOut
+    warnings: Warnings
+    cycles: list[Real] = Field(description="The axis of duty cycles since new")
+    pressure_bar: list[Real] = Field(description="The axis of line pressure, bar")
+    speed_rpm: list[Real] = Field(description="The axis of speed, rpm")
     parameters: SurfaceParameters = Field(description="The parameters by cycles and pressure")
-    torque_nm: list[list[list[float]]] = Field(description="Torque by cycles, pressure and speed, Nm")
+    torque_nm: list[list[list[Real]]] = Field(description="Torque by cycles, pressure and speed, Nm")
     model: Model
     prior: Prior
     severity: SeverityUsed
@@ -236,11 +252,11 @@ class Surfaces(WithoutHeld):
 class EngagementChannels(Answer):
     """The time course of an engagement, one column per quantity."""
 
-    time_s: list[float] = Field(description="Time, s")
-    pressure_bar: list[float] = Field(description="Line pressure, bar")
-    speed_rpm: list[float] = Field(description="Sliding speed, rpm")
-    torque_nm: list[float] = Field(description="Friction torque, Nm")
-    motor_torque_nm: list[float] = Field(description="The motor's torque, Nm")
+    time_s: list[Real] = Field(description="Time, s")
+    pressure_bar: list[Real] = Field(description="Line pressure, bar")
+    speed_rpm: list[Real] = Field(description="Sliding speed, rpm")
+    torque_nm: list[Real] = Field(description="Friction torque, Nm")
+    motor_torque_nm: list[Real] = Field(description="The motor's torque, Nm")
 
 
 class AllIndicators(Indicators):
@@ -264,36 +280,34 @@ class MeasuredEngagement(Answer):
     cycles: RunCycles
     kind: str = Field(description="The kind of run")
     time: str = Field(description="When the run was started, or received if that is unknown, ISO 8601")
-    initial_speed_rpm: float = Field(description="Sliding speed at contact, rpm")
-    maximum_pressure_bar: float = Field(description="Highest pressure of the slip, bar")
+    initial_speed_rpm: Real = Field(description="Sliding speed at contact, rpm")
+    maximum_pressure_bar: Real = Field(description="Highest pressure of the slip, bar")
     indicators: AllIndicators = Field(description="The indicators, each with its standard error")
 
 
 class EngagementTrace(Answer):
     """The time course of an engagement, one column per quantity. Time counts from contact."""
 
-    time_s: list[float] = Field(description="Time since contact, s")
-    pressure_bar: list[float] = Field(description="Line pressure, bar")
-    speed_rpm: list[float] = Field(description="Sliding speed minus the sensor's reading at standstill, rpm")
-    torque_nm: list[float] = Field(description="Friction torque minus the sensor's reading before contact, Nm")
+    time_s: list[Real] = Field(description="Time since contact, s")
+    pressure_bar: list[Real] = Field(description="Line pressure, bar")
+    speed_rpm: list[Real] = Field(description="Sliding speed minus the sensor's reading at standstill, rpm")
+    torque_nm: list[Real] = Field(description="Friction torque minus the sensor's reading before contact, Nm")
 
 
 class ModelledEngagement(Answer):
     """The tracked model's engagement, for the pressure, initial speed and drive of a measured one."""
 
     channels: EngagementTrace = Field(description="The course of the simulated engagement")
-    inertia_kg_m2: float = Field(
-        description="The shaft's inertia, estimated from its deceleration in the record, kg m²"
-    )
-    motor_torque_limit_nm: float = Field(
+    inertia_kg_m2: Real = Field(description="The shaft's inertia, estimated from its deceleration in the record, kg m²")
+    motor_torque_limit_nm: Real = Field(
         description="The drive's torque, estimated from the clutch's torque at standstill, Nm"
     )
-    stop_time_s: float | None = Field(description="Simulated stop time, s; null if the simulated clutch does not stop")
-    torque_discrepancy: float = Field(
+    stop_time_s: Real | None = Field(description="Simulated stop time, s; null if the simulated clutch does not stop")
+    torque_discrepancy: Real = Field(
         description="Root mean square of measured minus simulated torque, over that of the measured torque"
     )
-    stop_time_difference_s: float | None = Field(description="Measured minus simulated stop time, s")
-    stop_time_difference_sd_s: float | None = Field(description="Standard error of the measured stop time, s")
+    stop_time_difference_s: Real | None = Field(description="Measured minus simulated stop time, s")
+    stop_time_difference_sd_s: Real | None = Field(description="Standard error of the measured stop time, s")
 
 
 class ComparedEngagement(Answer):
@@ -307,7 +321,7 @@ class ComparedEngagement(Answer):
     )
 
 
-class EngagementOut(WithoutHeld):
+class EngagementOut(Answer):
     """A simulated engagement of the tracked clutch, and the measured ones."""
 
     clutch_id: ClutchName
@@ -315,16 +329,18 @@ class EngagementOut(WithoutHeld):
     simulated: Literal[True] = Field(
         description="Always true: the engagement is simulated, whatever the clutch's origin"
     )
-    at_cycles: float = Field(description="Duty cycles since new of the clutch's state")
+    at_cycles: Real = Field(description="Duty cycles since new of the clutch's state")
     model: Model
-    initial_speed_rpm: float = Field(description="Sliding speed at the start, rpm")
-    maximum_pressure_bar: float = Field(description="Highest line pressure, bar")
-    motor_torque_limit_nm: float = Field(description="The motor's limit, Nm")
+    initial_speed_rpm: Real = Field(description="Sliding speed at the start, rpm")
+    maximum_pressure_bar: Real = Field(description="Highest line pressure, bar")
+    motor_torque_limit_nm: Real = Field(description="The motor's limit, Nm")
     engaged: bool = Field(description="Whether the clutch comes to standstill")
-    duration_s: float | None = Field(description="From contact to standstill, s; null while it slips")
-    energy_kj: float = Field(description="Dissipated energy, kJ")
+    duration_s: Real | None = Field(description="From contact to standstill, s; null while it slips")
+    energy_kj: Real = Field(description="Dissipated energy, kJ")
     channels: EngagementChannels = Field(description="The course of the engagement")
     measured: list[MeasuredEngagement] = Field(description="The measured engagements that were evaluated, by cycles")
     compared: ComparedEngagement | None = Field(
         description="One measured engagement beside the tracked model's; null if this life has none"
     )
+    held_runs: HeldLeftOut
+    warnings: Warnings

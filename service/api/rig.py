@@ -6,7 +6,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, StringConstraints, model_validator
 
 from service.api import base
-from service.api.base import Answer, Identifier, Schema, page_of
+from service.api.base import Answer, Identifier, Page, Real, Schema
 from service.api.run import Fit, Warned
 
 FileKindName = Literal["stationary_stribeck", "dynamic_stribeck"]
@@ -103,7 +103,10 @@ class RigOut(RigIn):
     saved_by: str = Field(description="Who: `key:` with the key's id and note, or `local`")
 
 
-RigPage = page_of("RigPage", RigOut, "Rig profiles by name.", "The profiles of this page")
+class RigPage(Page[RigOut]):
+    """Rig profiles by name."""
+
+    items: list[RigOut] = Field(description="The profiles of this page")
 
 
 class PreviewColumn(Answer):
@@ -114,17 +117,17 @@ class PreviewColumn(Answer):
     unit: str | None = Field(description="The unit that is used; null: none, or the column is ignored")
     channel: ChannelName | None = Field(description="The channel; null: the column is ignored")
     in_part: bool = Field(description="Whether words of its title are not known, so that the channel should be checked")
-    scale: float = Field(description="The scale, in the channel's unit")
-    offset: float = Field(description="The offset, in the channel's unit")
+    scale: Real = Field(description="The scale, in the channel's unit")
+    offset: Real = Field(description="The offset, in the channel's unit")
 
 
 class PreviewPiece(Answer):
     """A part of a sampled record: a plateau, or the part of a dynamic test at one pressure."""
 
-    start_s: float = Field(description="Its start, s")
-    stop_s: float = Field(description="Its end, s")
-    pressure_bar: float = Field(description="Line pressure, bar")
-    speed_rpm: float | None = Field(description="Speed of a plateau, rpm; null for a stretch")
+    start_s: Real = Field(description="Its start, s")
+    stop_s: Real = Field(description="Its end, s")
+    pressure_bar: Real = Field(description="Line pressure, bar")
+    speed_rpm: Real | None = Field(description="Speed of a plateau, rpm; null for a stretch")
 
 
 class Preview(Answer):
@@ -141,16 +144,16 @@ class Preview(Answer):
     kind: FileKindName | None = Field(
         description="The kind of run: from the request or the profile, or the only one that fits"
     )
-    cycles: float | None = Field(
+    cycles: Real | None = Field(
         description="Cycles: from the request, or through the profile from the file's name or a cell"
     )
     run_id: str | None = Field(description="The run's name, if the profile finds one in the file's name")
+    rows: int = Field(description="Samples of each channel")
     kinds: list[FileKindName] = Field(description="The kinds of run that the channels allow")
     missing: list[str] = Field(
         description="What is still missing before the file can be sent: channels, `kind`, `cycles`"
     )
-    rows: int = Field(description="Samples of each channel")
-    channels: dict[str, list[float]] = Field(description="The channels as they are read, thinned for a plot")
+    channels: dict[str, list[Real]] = Field(description="The channels as they are read, thinned for a plot")
     pieces: list[PreviewPiece] = Field(description="The parts of a sampled record")
     fits: list[Fit] = Field(description="The fitted curves, as in a receipt")
     warnings: list[Warned] = Field(description="Warnings of reading, cutting and fitting, including what was left out")

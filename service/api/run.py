@@ -1,8 +1,8 @@
 """Runs as they are posted, and the receipts that answer them."""
 
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Literal, Self
 
-from pydantic import Field, StringConstraints, TypeAdapter, model_validator
+from pydantic import Field, JsonValue, StringConstraints, TypeAdapter, model_validator
 
 from service.api import base
 
@@ -10,8 +10,8 @@ from service.api import base
 class IndicatorEstimate(base.Answer):
     """A value with its standard error from noise."""
 
-    value: float = Field(description="The value")
-    sd: float = Field(description="Its standard error")
+    value: base.Real = Field(description="The value")
+    sd: base.Real = Field(description="Its standard error")
 
 
 class Indicators(base.Answer):
@@ -40,10 +40,10 @@ class ReceivedEngagement(base.Answer):
         "`time_not_increasing`, `sampled_too_slowly`, `starts_in_contact`, `gap`, `too_few_samples`"
     )
     message: str = Field(description="The status in a sentence")
-    start_s: float | None = Field(description="Start of slip on the record's clock, s")
-    end_s: float | None = Field(description="End of slip on the record's clock, s")
-    initial_speed_rpm: float | None = Field(description="Sliding speed at contact, rpm")
-    maximum_pressure_bar: float | None = Field(description="Highest pressure of the slip, bar")
+    start_s: base.Real | None = Field(description="Start of slip on the record's clock, s")
+    end_s: base.Real | None = Field(description="End of slip on the record's clock, s")
+    initial_speed_rpm: base.Real | None = Field(description="Sliding speed at contact, rpm")
+    maximum_pressure_bar: base.Real | None = Field(description="Highest pressure of the slip, bar")
     indicators: Indicators = Field(description="The indicators, each with its standard error")
 
 
@@ -178,7 +178,7 @@ class Warned(base.Answer):
 class Doubt(Warned):
     """Why a run is held."""
 
-    likely_cycles: float | None = Field(
+    likely_cycles: base.Real | None = Field(
         default=None, description="The cycles that the doubt suggests; absent if it suggests none"
     )
 
@@ -219,24 +219,24 @@ class Correction(base.Schema):
 class Parameters(base.Answer):
     """The four Stribeck parameters of eq. 3."""
 
-    static_torque_nm: float = Field(description="Static torque M_s, Nm")
-    coulomb_ratio: float = Field(description="Coulomb torque over static torque, M̄_c")
-    stribeck_velocity_m_s: float = Field(description="Stribeck velocity V_S, m/s")
-    viscous_coefficient: float = Field(description="Viscous coefficient C_v, Nm/(m/s)^0.3")
+    static_torque_nm: base.Real = Field(description="Static torque M_s, Nm")
+    coulomb_ratio: base.Real = Field(description="Coulomb torque over static torque, M̄_c")
+    stribeck_velocity_m_s: base.Real = Field(description="Stribeck velocity V_S, m/s")
+    viscous_coefficient: base.Real = Field(description="Viscous coefficient C_v, Nm/(m/s)^0.3")
 
 
 class Fit(base.Answer):
     """The fitted Stribeck curve of one pressure (eq. 4, 5)."""
 
-    pressure_bar: float = Field(description="Line pressure, bar")
+    pressure_bar: base.Real = Field(description="Line pressure, bar")
     parameters: Parameters = Field(description="The fitted parameters")
     standard_errors: Parameters = Field(description="Their standard errors")
-    mse_percent: float | None = Field(description="Eq. 5, %; null if the torque does not vary")
-    rmse_nm: float = Field(description="Root mean square of the residuals, Nm")
-    noise_nm: float = Field(description="Standard deviation of one point, Nm")
+    mse_percent: base.Real | None = Field(description="Eq. 5, %; null if the torque does not vary")
+    rmse_nm: base.Real = Field(description="Root mean square of the residuals, Nm")
+    noise_nm: base.Real = Field(description="Standard deviation of one point, Nm")
     acceptable: bool = Field(description="Whether `mse_percent` is below 5")
-    mean_cof: float | None = Field(description="Mean COF of the curve; null if the data do not determine it")
-    mean_cof_sd: float | None = Field(description="Its standard deviation")
+    mean_cof: base.Real | None = Field(description="Mean COF of the curve; null if the data do not determine it")
+    mean_cof_sd: base.Real | None = Field(description="Its standard deviation")
     points: int = Field(description="Number of points")
     status: Literal["determined", "at_bound", "undetermined"] = Field(
         description="Whether the data determine all parameters, set one to zero, or leave some undetermined"
@@ -248,16 +248,16 @@ class Fit(base.Answer):
 class Loop(base.Answer):
     """A friction loop at one pressure; a value is null if the record does not determine it."""
 
-    pressure_bar: float = Field(description="Line pressure, bar")
-    loop_area_nm_m_s: float | None = Field(
+    pressure_bar: base.Real = Field(description="Line pressure, bar")
+    loop_area_nm_m_s: base.Real | None = Field(
         description="Area (eq. 8), Nm·m/s; positive if torque is higher while the speed rises"
     )
-    loop_area_sd_nm_m_s: float | None = Field(description="Its standard deviation")
-    attractor_nm_s: float | None = Field(description="The attractor's rate C of the GMS model, Nm/s")
-    attractor_sd_nm_s: float | None = Field(description="Its standard deviation")
-    film_time_s: float | None = Field(description="Time constant of the squeeze film, s")
-    film_time_sd_s: float | None = Field(description="Its standard deviation")
-    frequency_hz: float | None = Field(description="Frequency of the speed, Hz")
+    loop_area_sd_nm_m_s: base.Real | None = Field(description="Its standard deviation")
+    attractor_nm_s: base.Real | None = Field(description="The attractor's rate C of the GMS model, Nm/s")
+    attractor_sd_nm_s: base.Real | None = Field(description="Its standard deviation")
+    film_time_s: base.Real | None = Field(description="Time constant of the squeeze film, s")
+    film_time_sd_s: base.Real | None = Field(description="Its standard deviation")
+    frequency_hz: base.Real | None = Field(description="Frequency of the speed, Hz")
     periods: int = Field(description="Number of whole periods")
     direction: str = Field(
         description="`higher_accelerating`, `higher_decelerating`, or `none`: the area is within noise"
@@ -288,8 +288,8 @@ class ReceivedFile(base.Answer):
     rig: str | None = Field(description="The rig profile that was used; null: no saved profile")
 
 
-class Receipt(base.Answer):
-    """The evaluation of a stored run."""
+class Evaluation(base.Answer):
+    """What was computed of a run by itself and among the others; stored with it."""
 
     clutch_id: base.ClutchName
     run_id: base.RunName
@@ -312,9 +312,14 @@ class Receipt(base.Answer):
     reason: EndReason | None = Field(description="Why the life has ended; null where the run declares no end")
     note: str | None = Field(description="The maintenance note; null for other kinds")
     code_version: str = Field(description="The release that evaluated the run")
+
+
+class Receipt(Evaluation):
+    """The evaluation of a stored run."""
+
     state: State
     doubts: list[Doubt] = Field(description="Why the run is, or was, held; empty if nothing was odd")
-    sent_cycles: float = Field(description="Cycles as sent; `cycles` has the present value")
+    sent_cycles: base.Real = Field(description="Cycles as sent; `cycles` has the present value")
     received_by: str | None = Field(description="Who posted it: `key:` with the key's id and note, or `local`")
 
 
@@ -338,26 +343,37 @@ class Change(base.Answer):
         description="The run; null for a change of the clutch's record or of an inspection, which `after` names"
     )
     reason: str = Field(description="Why")
-    before: dict[str, Any] = Field(description="The changed fields before")
-    after: dict[str, Any] = Field(description="The changed fields after")
+    before: dict[str, JsonValue] = Field(description="The changed fields before")
+    after: dict[str, JsonValue] = Field(description="The changed fields after")
 
 
-ChangePage = base.page_of("ChangePage", Change, "The audit trail, newest first.", "The entries of this page")
+class ChangePage(base.Page[Change]):
+    """The audit trail, newest first."""
+
+    items: list[Change] = Field(description="The entries of this page")
 
 
-class RunOut(Receipt):
-    """A receipt with the run's channels: as sent, or with `points` thinned for a plot."""
+class RunDescription(Receipt):
+    """A receipt with what is known of the run beside its channels."""
 
-    reading: dict[str, Any] | None = Field(
+    reading: dict[str, JsonValue] | None = Field(
         description="How its file was read: the complete profile; null for a run sent as JSON"
     )
     changes: list[Change] = Field(description="The run's entries of the audit trail, newest first")
     samples: int = Field(description="Number of samples of each channel as sent; 0 for a run without channels")
-    channels: dict[str, list[float]] = Field(
+
+
+class RunOut(RunDescription):
+    """A receipt with the run's channels: as sent, or with `points` thinned for a plot."""
+
+    channels: dict[str, list[base.Real]] = Field(
         description="The channels by name, bit for bit as sent and of equal length. With `points`, row k of all "
         "channels is one measured sample: the answer keeps the lowest and highest of every channel in"
         " equal bins, the first and the last"
     )
 
 
-RunPage = base.page_of("RunPage", Receipt, "Receipts by cycles.", "The receipts of this page")
+class RunPage(base.Page[Receipt]):
+    """Receipts by cycles."""
+
+    items: list[Receipt] = Field(description="The receipts of this page")

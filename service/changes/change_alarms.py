@@ -1,11 +1,10 @@
 """Rules of alarms and their receivers are saved and deleted; alarms are raised and cleared with that, and acknowledged."""
 
 import secrets
-from typing import Any
 
 from service import repository
 from service.alarms import raising
-from service.api.alarm import AlarmIn, WebhookIn
+from service.api.alarm import AlarmIn, EventOut, WebhookIn
 from service.api.base import MAX_RULES
 from service.errors import NotPossibleNowError, found
 from storage import alarms, clutches, keys, webhooks
@@ -60,7 +59,7 @@ def remove(database: Database, alarm_id: str) -> None:
             raising.evaluate(connection, clutch_id)
 
 
-def acknowledge(database: Database, event_id: str, *, note: str, by: str, at: str) -> dict[str, Any]:
+def acknowledge(database: Database, event_id: str, *, note: str, by: str, at: str) -> EventOut:
     """Note that `by` has seen an alarm; what was acknowledged or is over already stays as it is. Raises NotFoundError."""
     with database.writing() as connection:
         row = found(alarms.event(connection, event_id), "event of an alarm", event_id)

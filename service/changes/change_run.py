@@ -16,17 +16,17 @@ from typing import Any
 from sqlalchemy import Connection
 
 from service import repository
+from service.api.run import Evaluation, Receipt
 from service.channels import whole
 from service.clutch.analysis import analyse
 from service.clutch.incoming_run import IncomingRun
-from service.clutch.items import notice_items, receipt
+from service.clutch.items import doubted, receipt
 from service.clutch.model_correction import RunReader
 from service.clutch.plausibility.doubts import Judged, doubts_alone, doubts_together
 from service.clutch.recomputation import (
     Arrival,
     ClutchHistory,
     Levels,
-    Receipt,
     Results,
     cofs_among,
     computed_again,
@@ -73,7 +73,7 @@ class _Loaded:
     events: tuple[Event, ...]
     state: ClutchHistory
     levels: Levels
-    receipts: Mapping[str, Receipt]
+    receipts: Mapping[str, Evaluation]
     withdrawn_from: str
     again: Arrival | None = None
 
@@ -121,7 +121,7 @@ def change(
     """
     names = tuple(dict.fromkeys(run_ids))
     request = _Request(clutch_id=clutch_id, run_ids=names, action=action, reason=reason, by=by, at=at, cycles=cycles)
-    receipts = {answer["run_id"]: answer for answer in _change(database, request)}
+    receipts = {answer.run_id: answer for answer in _change(database, request)}
     return [receipts[run_id] for run_id in names]
 
 
@@ -269,7 +269,7 @@ def _judged(database: Database, loaded: _Loaded, cycles: float) -> RunRow:
         cycles=cycles,
         sent_cycles=None if cycles == sent_cycles else sent_cycles,
         state=runs.HELD if doubtful else runs.ACCEPTED,
-        doubts=tuple(notice_items(doubtful)),
+        doubts=tuple(doubted(doubtful)),
     )
 
 
@@ -298,7 +298,7 @@ def _computed(database: Database, loaded: _Loaded, rows: Sequence[RunRow]) -> tu
     held_runs = judged.aside(other_runs.held, [event for row, event in pairs if row.state == runs.HELD])
     after = replace(before, events=judged.settled(other_runs.events, accepted), held=held_runs)
     receipts = {**loaded.receipts}
-    receipts |= {row.run_id: receipts[row.run_id] | {"cycles": whole(row.cycles)} for row in rows}
+    receipts |= {row.run_id: receipts[row.run_id].model_copy(update={"cycles": whole(row.cycles)}) for row in rows}
     reader = loaded.reader(database)
     computed = Results()
     if accepted or judged.changes or any(row.state == runs.ACCEPTED for row in loaded.rows):
@@ -314,7 +314,7 @@ def _computed(database: Database, loaded: _Loaded, rows: Sequence[RunRow]) -> tu
     if evidence is not None:
         evidence = replace(evidence, levels=loaded.levels, receipts={**receipts, **changed})
     if computed.tracking is None:
-        summary = {**before.summary, **held_summary(after, {}, evidence)}
+        summary: Mapping[str, Any] = {**before.summary, **held_summary(after, {}, evidence)}
     else:
         summary = summarised(after, computed.tracking, evidence)
     teaches = any(
@@ -328,7 +328,7 @@ def _computed(database: Database, loaded: _Loaded, rows: Sequence[RunRow]) -> tu
     if loaded.again is not None:
         name, fits = loaded.row.run_id, loaded.again.analysis.fits
         computed = replace(computed, details={name: loaded.again.kept}, levels={name: fits, **computed.levels})
-    return tuple(replace(row, receipt=changed[row.run_id]) for row in rows), computed
+    return tuple(replace(row, receipt=repository.json_of(changed[row.run_id])) for row in rows), computed
 
 
 def _store(
@@ -352,5 +352,5 @@ def _store(
         changes.insert(connection, clutch_id, request.action, before, after, revision=revision, **entry)
 
 
-def _read_as(file: Mapping[str, Any]) -> dict[str, Any]:
+def _read_as(file: Mapping[str, object]) -> dict[str, object]:
     return {"rig": file["rig"], "reading": file["reading"]}

@@ -27,7 +27,7 @@ class _Edited:
     """A clutch as it was and as it is to be, and what then follows: nothing, results of its history, or all of them."""
 
     before: ClutchRow
-    record: dict[str, Any]
+    record: ClutchIn
     archived: bool
     results: Results | None
 
@@ -63,7 +63,7 @@ def _computed(database: Database, clutch_id: str, fields: Mapping[str, Any], arc
     record = ClutchIn.model_validate(before.model_dump(mode="json") | dict(fields))
     return _Edited(
         before=row,
-        record=record.model_dump(mode="json"),
+        record=record,
         archived=row.archived if archived is None else archived,
         results=None if record == before else _results(database, before, record),
     )
@@ -82,15 +82,13 @@ def _results(database: Database, before: ClutchIn, record: ClutchIn) -> Results:
     return repository.tracked_again(database, state, levels, receipts)
 
 
-def _entries(edited: _Edited) -> list[tuple[str, dict[str, Any], dict[str, Any]]]:
+def _entries(edited: _Edited) -> list[tuple[str, dict[str, object], dict[str, object]]]:
     """What the audit trail says: the action, and what changes as it was and as it is."""
-    before = repository.record(edited.before).model_dump(mode="json")
-    names = [name for name in before if before[name] != edited.record[name]]
-    entries = []
+    before, after = (record.model_dump(mode="json") for record in (repository.record(edited.before), edited.record))
+    names = [name for name in before if before[name] != after[name]]
+    entries: list[tuple[str, dict[str, object], dict[str, object]]] = []
     if names:
-        entries.append(
-            (changes.EDIT, {name: before[name] for name in names}, {name: edited.record[name] for name in names})
-        )
+        entries.append((changes.EDIT, {name: before[name] for name in names}, {name: after[name] for name in names}))
     if edited.archived != edited.before.archived:
         action = changes.ARCHIVE if edited.archived else changes.UNARCHIVE
         entries.append((action, {"archived": edited.before.archived}, {"archived": edited.archived}))
@@ -99,12 +97,12 @@ def _entries(edited: _Edited) -> list[tuple[str, dict[str, Any], dict[str, Any]]
 
 def _store(connection: Connection, edited: _Edited, *, reason: str, by: str, at: str) -> None:
     """The record and what follows, and the entries of the audit trail; the revision moves on."""
-    row, clutch_id = edited.before, edited.before.clutch_id
+    row, clutch_id, record = edited.before, edited.before.clutch_id, edited.record.model_dump(mode="json")
     clutches.set_record(
         connection,
         clutch_id,
-        record=edited.record,
-        content_sha256=content_of(edited.record),
+        record=record,
+        content_sha256=content_of(record),
         registered=row.record if row.registered is None and edited.results is not None else row.registered,
         archived=edited.archived,
     )

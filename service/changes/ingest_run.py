@@ -8,18 +8,18 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 from sqlalchemy import Connection
 
 from models.clutch import Geometry
 from models.loops.loops import FrictionLoop
 from service import repository
+from service.api.run import Evaluation, Receipt
 from service.clutch import timeline
 from service.clutch.analysis import LevelFit, analyse, loops_of
 from service.clutch.engagements import stored_engagement
 from service.clutch.incoming_run import IncomingRun
-from service.clutch.items import notice_items, receipt
+from service.clutch.items import doubted, receipt
 from service.clutch.notices import history_warnings, warned_again
 from service.clutch.plausibility.doubts import Judged, doubts_alone, doubts_together
 from service.clutch.recomputation import (
@@ -57,7 +57,7 @@ class _Outcome:
     there before; `appended`: nothing of the history that was there has changed."""
 
     revision: int
-    receipt: dict[str, Any]
+    receipt: Evaluation
     cofs: timeline.ByPressure
     results: Results
     doubts: tuple[Notice, ...] = ()
@@ -75,7 +75,7 @@ def ingest_posted(
     received_at: str,
     by: str,
     path: Path | None = None,
-) -> tuple[dict[str, Any], bool]:
+) -> tuple[Receipt, bool]:
     """Ingest a run that `read` makes from what was posted; a file at `path` is kept. Also raises what `read` does, and
     TooLargeError where the file is too long to be kept."""
     if path is None:
@@ -99,7 +99,7 @@ def ingest(
     received_at: str,
     by: str = "local",
     file: PackedFile | None = None,
-) -> tuple[dict[str, Any], bool]:
+) -> tuple[Receipt, bool]:
     """Take in a run that `by` sent, read from `file`; returns its receipt and whether it is new. Where results of earlier
     runs are damaged they are computed again first.
 
@@ -116,7 +116,7 @@ def ingest(
 
 def _ingested(
     database: Database, clutch_id: str, run: IncomingRun, *, received_at: str, by: str, file: PackedFile | None
-) -> tuple[dict[str, Any], bool]:
+) -> tuple[Receipt, bool]:
     with database.reading() as connection:
         clutch = repository.clutch(connection, clutch_id)
         stored = _stored(connection, clutch_id, run)
@@ -163,13 +163,13 @@ def _stored(connection: Connection, clutch_id: str, run: IncomingRun) -> RunRow 
     return stored
 
 
-def _repeat(stored: RunRow, run: IncomingRun) -> dict[str, Any]:
+def _repeat(stored: RunRow, run: IncomingRun) -> Receipt:
     if run.content_sha256 not in (stored.content_sha256, stored.details.get("file", {}).get("content_sha256")):
         raise ConflictError(
             f"run_id {run.run_id!r} is already stored with other content: the stored sha256 is {stored.content_sha256}, "
             f"the sha256 of the content sent is {run.content_sha256}"
         )
-    return repository.receipt(stored) | {"duplicate": True}
+    return repository.receipt(stored).model_copy(update={"duplicate": True})
 
 
 def _computed(
@@ -243,7 +243,7 @@ def _computed(
 
 def _receipt(
     before: ClutchHistory, state: ClutchHistory, event: timeline.Event, arrival: Arrival, levels: Levels
-) -> tuple[dict[str, Any], dict[str, str | None]]:
+) -> tuple[Evaluation, dict[str, str | None]]:
     """The run's receipt, and by which stationary test the loops of each dynamic one were evaluated: of those before, and of
     the run itself."""
     evaluated = timeline.stationary_tests_of(before.events)
@@ -268,7 +268,7 @@ def _one_step(
     state: ClutchHistory,
     event: timeline.Event,
     levels: Levels,
-    answer: dict[str, Any],
+    answer: Evaluation,
     arrival: Arrival,
     evaluated: Mapping[str, str | None],
 ) -> tuple[ClutchHistory, Results]:
@@ -282,7 +282,7 @@ def _one_step(
             corrected, state = {event.run_id: cofs}, replace(state, events=(*state.events[:-1], event))
     tracking = track(state, newest=event)
     noticed = history_warnings(state.lives, tracking.warnings, run_id=event.run_id)[event.run_id]
-    changed = {event.run_id: answer | {"warnings": answer["warnings"] + noticed}}
+    changed = {event.run_id: answer.model_copy(update={"warnings": answer.warnings + noticed})}
     outdated = evaluated != timeline.stationary_tests_of(state.events)
     if tracking.again or outdated:
         with database.reading() as connection:
@@ -290,13 +290,13 @@ def _one_step(
         if outdated:
             stored = repository.run_reader(database, state.clutch_id)
             loops = loops_again(state, levels, stored, evaluated)
-            changed |= {run_id: receipts[run_id] | {"loops": items} for run_id, items in loops.items()}
+            changed |= {run_id: receipts[run_id].model_copy(update={"loops": items}) for run_id, items in loops.items()}
         if tracking.again:
             changed |= warned_again(state.lives, tracking.warnings, receipts | changed)
     return state, Results(corrected=corrected, receipts=changed, tracking=tracking)
 
 
-def _evidence(database: Database, state: ClutchHistory, arrival: Arrival, answer: dict[str, Any]) -> ClutchMeasurements:
+def _evidence(database: Database, state: ClutchHistory, arrival: Arrival, answer: Evaluation) -> ClutchMeasurements:
     name = arrival.run.run_id
     with database.reading() as connection:
         stored = repository.evidence(connection, state.clutch_id)
@@ -330,7 +330,7 @@ def _store(
     outcome: _Outcome,
     *,
     by: str,
-) -> dict[str, Any]:
+) -> Receipt:
     """The run, its channels and fits, and what it changes; the revision moves on. Returns the receipt."""
     run = arrival.run
     row = RunRow(
@@ -342,10 +342,10 @@ def _store(
         received_at=arrival.received_at,
         content_sha256=run.content_sha256,
         details=arrival.kept | ({FOLLOWS: outcome.revision} if outcome.appended else {}),
-        receipt=outcome.receipt,
+        receipt=repository.json_of(outcome.receipt),
         code_version=CODE_VERSION,
         state=outcome.state,
-        doubts=notice_items(outcome.doubts),
+        doubts=tuple(doubted(outcome.doubts)),
         received_by=by,
     )
     run_key = runs.insert(connection, row)

@@ -4,13 +4,12 @@ No track and no prediction uses inspections: nothing is computed again. Nothing 
 """
 
 import hashlib
-from typing import Any
 
 from sqlalchemy import Connection
 
 from service import repository
 from service.api.base import MAX_PHOTOGRAPHS
-from service.api.inspection import InspectionIn, MediaType
+from service.api.inspection import InspectionIn, InspectionOut, MediaType, PhotographOut
 from service.errors import InvalidError, NotPossibleNowError
 from service.repository import inspection, inspection_answers, inspection_hash, photograph_answer
 from storage import changes, clutches, inspections
@@ -22,7 +21,7 @@ from storage.runs import WITHDRAWN
 _ID_CHARACTERS = 16
 
 
-def inspect(database: Database, clutch_id: str, sent: InspectionIn, *, by: str, at: str) -> tuple[dict[str, Any], bool]:
+def inspect(database: Database, clutch_id: str, sent: InspectionIn, *, by: str, at: str) -> tuple[InspectionOut, bool]:
     """Store an inspection; returns it as it is answered, and whether it is new: the same content is one inspection.
 
     Raises NotFoundError. An archived clutch takes inspections too: it may be taken apart when all tests are made.
@@ -43,12 +42,12 @@ def inspect(database: Database, clutch_id: str, sent: InspectionIn, *, by: str, 
         new = inspections.get(connection, clutch_id, row.inspection_id) is None
         if new:
             inspections.insert(connection, row)
-        return _answer(connection, clutch_id, row.inspection_id) | {"duplicate": not new}, new
+        return _answer(connection, clutch_id, row.inspection_id).model_copy(update={"duplicate": not new}), new
 
 
 def add_photograph(
     database: Database, clutch_id: str, inspection_id: str, content: bytes, media_type: MediaType, *, by: str, at: str
-) -> tuple[dict[str, Any], bool]:
+) -> tuple[PhotographOut, bool]:
     """Add a photograph to an inspection; returns it as it is answered, and whether the inspection had it not yet.
 
     Raises NotFoundError, InvalidError where the content is not of that type, NotPossibleNowError where the inspection has
@@ -91,7 +90,7 @@ def _require_type(content: bytes, media_type: MediaType) -> None:
 
 def change(
     database: Database, clutch_id: str, inspection_id: str, state: str, *, reason: str, by: str, at: str
-) -> dict[str, Any]:
+) -> InspectionOut:
     """Withdraw an inspection (`state` WITHDRAWN) or take that back (ACCEPTED); returns it as it is answered.
 
     One that is so already is not changed; else the audit trail and the clutch's revision move on. Raises NotFoundError.
@@ -107,9 +106,9 @@ def change(
         return _answer(connection, clutch_id, inspection_id)
 
 
-def _summary(row: InspectionRow, state: str) -> dict[str, Any]:
+def _summary(row: InspectionRow, state: str) -> dict[str, object]:
     return {"inspection_id": row.inspection_id, "cycles": row.content["cycles"], "state": state}
 
 
-def _answer(connection: Connection, clutch_id: str, inspection_id: str) -> dict[str, Any]:
+def _answer(connection: Connection, clutch_id: str, inspection_id: str) -> InspectionOut:
     return inspection_answers(connection, [inspection(connection, clutch_id, inspection_id)])[0]

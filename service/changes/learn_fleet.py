@@ -16,10 +16,12 @@ from models.prognosis.first_passage import horizon_at
 from models.prognosis.fleet import Taught, population, taught
 from models.prognosis.scoring import measured_end
 from service import repository
+from service.api.fleet import Kind
+from service.api.run import Evaluation
 from service.clutch.assumptions import ALL_PRESSURES, Assumptions, may_be_of
 from service.clutch.criteria import MAX_ATTEMPTS
 from service.clutch.notices import warned_again
-from service.clutch.recomputation import ClutchHistory, Receipt, Results, track
+from service.clutch.recomputation import ClutchHistory, Results, track
 from service.clutch.timeline import WORN, Life
 from service.clutch.tracking import CARRIED, mean_offset_of
 from service.clutch.with_held import ClutchMeasurements, needs_evidence, summarised
@@ -50,7 +52,7 @@ class Fleet:
     """Clutches of a kind, the version of its prior that was stored before they were read (0: none), and what the lives of
     each have taught."""
 
-    kind: Json
+    kind: Kind
     version: int
     lessons: dict[str, list[Lesson]] = field(default_factory=dict)
 
@@ -72,13 +74,13 @@ class Refreshed:
     """What a refresh did: the kinds of which a new version was stored, the clutches whose answers have changed, and those
     left to the next refresh, with the reason."""
 
-    kinds: tuple[Json, ...]
+    kinds: tuple[Kind, ...]
     changed: tuple[str, ...]
     left: Mapping[str, str]
 
 
 #: What a clutch's tracks are computed again from: its state, its receipts, and what else its summary follows from.
-_Tracked: TypeAlias = tuple[ClutchHistory, Mapping[str, Receipt], ClutchMeasurements | None]
+_Tracked: TypeAlias = tuple[ClutchHistory, Mapping[str, Evaluation], ClutchMeasurements | None]
 
 
 def refresh(
@@ -111,7 +113,7 @@ def refresh(
             break
     left |= dict.fromkeys(ended[Ending.LEFT], LEFT)
     return Refreshed(
-        kinds=tuple(to_object(kind) for kind in sorted(fresh)),
+        kinds=tuple(map(_kind, sorted(fresh))),
         changed=tuple(sorted(ended[Ending.STORED])),
         left=dict(sorted(left.items())),
     )
@@ -119,7 +121,7 @@ def refresh(
 
 def _names(database: Database, of: str | None) -> list[str]:
     """The clutches that may be of a fleet, those first whose life goes on: somebody waits for their predictions."""
-    kind = None if of is None else to_object(of)
+    kind = None if of is None else _kind(of)
     with database.reading() as connection:
         rows = [repository.clutch(connection, clutch_id) for clutch_id in clutches.all_ids(connection)]
     rows = [row for row in rows if kind is None or may_be_of(repository.record(row), kind)]
@@ -161,7 +163,7 @@ def _fleets(
     for clutch_id, outcome in zip(names, taught_by, strict=True):
         kind, lessons = outcome.value()
         if lessons:
-            name = assumptions.fleet_key(kind)
+            name = assumptions.fleet_key(repository.json_of(kind))
             fleet = fleets.setdefault(name, Fleet(kind=kind, version=versions.get(name, 0)))
             fleet.lessons[clutch_id] = lessons
         advance()
@@ -203,7 +205,7 @@ def as_job(
 
 
 def _ask_for_the_rest(database: Database, task: ChangeTask) -> None:
-    kind = None if task.of is None else to_object(task.of)
+    kind = None if task.of is None else _kind(task.of)
     with database.writing(of=jobs.FLEET_REFRESH) as connection:
         repository.ask_fleet_refresh(connection, kind, by=task.by, at=task.at, learned=True)
 
@@ -213,7 +215,12 @@ def _state(database: Database, clutch_id: str) -> ClutchHistory:
         return repository.state(connection, clutch_id)
 
 
-def lessons_of(state: ClutchHistory) -> tuple[Json, list[Lesson]]:
+def _kind(name: str) -> Kind:
+    """The kind of clutches that a fleet is named by."""
+    return Kind.model_validate(to_object(name))
+
+
+def lessons_of(state: ClutchHistory) -> tuple[Kind, list[Lesson]]:
     """A clutch's kind, and what each of its lives teaches."""
     assumptions = state.assumptions()
     lessons = [_lesson(life, assumptions, state.fraction) for life in state.lives]
@@ -258,19 +265,19 @@ def _stored_again(database: Database, fleet: Fleet, now: str, executor: Executor
     (learned,) = executor.map(learned_without, [(fleet, ())])
     with database.reading() as connection:
         allow_damage(connection, everywhere=True)  # it is replaced
-        stored = assumptions.current_fleet_prior(connection, fleet.kind)
+        stored = assumptions.current_fleet_prior(connection, repository.json_of(fleet.kind))
     if learned.value() is None or (stored is not None and stored.content == learned.value()):
         return Ending.NOTHING
     rows = _versions(fleet, learned.value(), fleet.version + 1, now, executor)
     with database.writing() as connection:
         allow_damage(connection, everywhere=True)
-        newest = assumptions.current_fleet_prior(connection, fleet.kind)
+        newest = assumptions.current_fleet_prior(connection, repository.json_of(fleet.kind))
         if newest is not None and newest.version > fleet.version:
             return Ending.LEFT
         for row in rows:
             assumptions.insert_fleet_prior(connection, row)
         # clutches are still under the last
-        assumptions.forget_left_out(connection, fleet.kind, before=fleet.version)
+        assumptions.forget_left_out(connection, repository.json_of(fleet.kind), before=fleet.version)
     return Ending.STORED
 
 
@@ -288,7 +295,7 @@ def _versions(fleet: Fleet, whole: Json | None, version: int, now: str, executor
     priors = {NOBODY: whole} | {group[0]: prior.value() for group, prior in zip(groups, learned, strict=True)}
     return [
         FleetPriorRow(
-            fleet=fleet.kind,
+            fleet=repository.json_of(fleet.kind),
             version=version,
             left_out=left_out,
             created_at=now,
@@ -308,7 +315,7 @@ def _brought_up(database: Database, names: Sequence[str], executor: Executor) ->
         with database.reading() as connection:
             state = repository.state(connection, clutch_id, newest_prior=True)
             last = results.prediction_at(connection, clutch_id, CARRIED[0], ALL_PRESSURES)
-            if last is None or last.payload.get("prior") == dict(state.assumptions().prior.name):
+            if last is None or repository.prediction(last).prior == state.assumptions().prior.name:
                 return None
             receipts = repository.receipts(connection, clutch_id)
         evidence = None

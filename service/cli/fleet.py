@@ -3,11 +3,14 @@ database, while the service runs.
 """
 
 from datetime import UTC, datetime
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, get_args
 
 import typer
 
 from service.cli.options import DATABASE, EX_USAGE, Database, Scheduler, err, executor, existing, fail, print_line
+
+if TYPE_CHECKING:
+    from service.api.fleet import FleetPriorOut, ScoreSummary
 
 app = typer.Typer(help="The priors learned from earlier clutches.")
 
@@ -17,10 +20,11 @@ def show(context: typer.Context, database: Database = DATABASE) -> None:
     """The newest version of every kind's prior."""
     if context.invoked_subcommand is not None:
         return
-    from service.answers.fleet_priors import newest  # start-up time
+    from service.answers.fleet_priors import page  # start-up time
+    from service.paging import Part  # start-up time
 
     with existing(database, read_only=True) as opened:
-        priors = newest(opened)
+        priors = page(opened, Part()).items
     for item in priors:
         print_line(_line(item))
     if not priors:
@@ -34,16 +38,17 @@ def refresh(
     quiet: Annotated[bool, typer.Option("--quiet", help="Print changes only")] = False,
 ) -> None:
     """Learn every kind's prior again, and update the predictions of clutches whose prior has changed."""
-    from service.answers.fleet_priors import newest  # start-up time
+    from service.answers.fleet_priors import page  # start-up time
     from service.changes.learn_fleet import refresh as learn_priors  # start-up time
     from service.jobs.progress import progress  # start-up time
+    from service.paging import Part  # start-up time
 
     now = datetime.now(UTC).isoformat(timespec="seconds")
     with existing(database) as opened, executor(scheduler) as computing, progress(err, "learning") as advance:
         done = learn_priors(opened, computing, now=now, advance=advance)
-        priors = newest(opened)
+        priors = page(opened, Part()).items
     for item in priors:
-        new = item["kind"] in done.kinds
+        new = item.kind in done.kinds
         if new or not quiet:
             print_line(_line(item) + (" (new)" if new else ""))
     for clutch_id in done.changed:
@@ -57,13 +62,13 @@ def refresh(
         )
 
 
-def _line(item: dict[str, Any]) -> str:
-    kind, population = item["kind"], item["population"]
-    kind_text = f"{kind['friction_material']} on {kind['reaction_plate']} in {kind['fluid']}, {kind['origin']}"
+def _line(item: "FleetPriorOut") -> str:
+    kind, population = item.kind, item.population
+    kind_text = f"{kind.friction_material} on {kind.reaction_plate} in {kind.fluid}, {kind.origin}"
     return (
-        f"{kind_text}: version {item['version']}, {item['clutches']} clutches; "
-        f"change {population['change']['median']:.2f} of the initial value, "
-        f"scale {population['scale_cycles']['median']:.0f} cycles"
+        f"{kind_text}: version {item.version}, {item.clutches} clutches; "
+        f"change {population.change.median:.2f} of the initial value, "
+        f"scale {population.scale_cycles.median:.0f} cycles"
     )
 
 
@@ -75,31 +80,31 @@ def score(
 ) -> None:
     """Score the prediction at every test of every life that has ended."""
     from service.answers import scores  # start-up time
-    from service.clutch.tracking import METHODS  # start-up time
+    from service.api.life import MethodName  # start-up time
     from storage import clutches  # start-up time
 
-    if method not in METHODS:
-        fail(f"method must be one of {', '.join(METHODS)}, got {method!r}", EX_USAGE)
+    methods = get_args(MethodName)
+    named: MethodName | None = next((name for name in methods if name == method), None)
+    if named is None:
+        fail(f"method must be one of {', '.join(methods)}, got {method!r}", EX_USAGE)
     with existing(database, read_only=True) as opened:
         with opened.reading() as connection:
             clutch_ids = clutches.all_ids(connection)
         fleet = scores.scores_of_fleet(
-            (scores.scores_of_clutch(opened, name, method) for name in clutch_ids), method=method
+            (scores.scores_of_clutch(opened, name, named) for name in clutch_ids), method=named
         )
-    for life in fleet["lives"]:
-        print_line(f"{life['clutch_id']}: ended at {life['end_of_life_cycles']:.0f} cycles")
-    if not fleet["lives"]:
+    for life in fleet.lives:
+        print_line(f"{life.clutch_id}: ended at {life.end_of_life_cycles:.0f} cycles")
+    if not fleet.lives:
         print_line("no clutch has reached its threshold yet: there is nothing to score")
         return
     print_line("share of life  predictions  CRPS/life  interval/life  coverage  alpha-lambda")
-    for row in [*fleet["stages"], fleet["overall"]]:
-        print_line(_score(row))
+    for stage in fleet.stages:
+        print_line(_score(f"{stage.share_of_life:.1f}", stage))
+    print_line(_score("all", fleet.overall))
 
 
-def _score(row: dict[str, Any]) -> str:
-    stage = f"{row['share_of_life']:.1f}" if "share_of_life" in row else "all"
-    shares = (row[name] for name in ("crps_share", "interval_share", "coverage", "alpha_lambda"))
+def _score(stage: str, means: "ScoreSummary") -> str:
+    shares = (getattr(means, name) for name in ("crps_share", "interval_share", "coverage", "alpha_lambda"))
     columns = ["-" if value is None else f"{value:.3f}" for value in shares]
-    return (
-        f"{stage:>13}  {row['predictions']:>11}  {columns[0]:>9}  {columns[1]:>13}  {columns[2]:>8}  {columns[3]:>12}"
-    )
+    return f"{stage:>13}  {means.predictions:>11}  {columns[0]:>9}  {columns[1]:>13}  {columns[2]:>8}  {columns[3]:>12}"

@@ -6,7 +6,6 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -56,7 +55,7 @@ class Analysis:
     times: tuple[float, ...] | None = None
     engagement: Engagement | None = None
 
-    def details_to_store(self, run: IncomingRun) -> dict[str, Any]:
+    def details_to_store(self, run: IncomingRun) -> dict[str, object]:
         """What is kept beside a run's channels: what was sent with them, its range of speeds [rad/s] and its oil [K], the
         course of an engagement."""
         details = dict(run.details) | {"origin": run.origin}

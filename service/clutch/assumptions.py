@@ -5,7 +5,7 @@ Every prediction is made under assumptions, and every answer names its model, it
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, TypeAlias
+from typing import Final, TypeAlias
 
 import numpy as np
 
@@ -17,14 +17,18 @@ from models.tracking.measurement import Measurement
 from models.tracking.posterior import TrackPosterior
 from models.tracking.prior import TrackPrior, weak
 from service.api.clutch import ClutchIn
+from service.api.fleet import Kind
+from service.api.life import ModelName, PriorName, SeverityName
 
-MEAN_COF = "mean_cof"
+MEAN_COF: Final = "mean_cof"
 #: The mean over the reference pressures stands under this pressure [Pa].
 ALL_PRESSURES = 0.0
 
 #: The priors of a series, by name: always the first, the second where a fleet has taught one.
-WEAK, FLEET = "weak", "fleet"
-BASELINE: Mapping[str, Any] = {"name": "baseline", "effects": []}
+WEAK: Final = "weak"
+FLEET: Final = "fleet"
+WEAK_PRIOR = PriorName(name=WEAK, version=None, clutches=0)
+BASELINE = ModelName(name="baseline", effects=[])
 
 #: Mean COF [d, m] that an adopted model's effects add under each of its draws at cycles since new [m], at a pressure [Pa] or
 #: ALL_PRESSURES.
@@ -36,7 +40,7 @@ class ModelInForce:
     """The model as answers name it, the weights of its draws, its course (None: eq. 6 alone), and the exponent of an adopted
     load severity."""
 
-    name: Mapping[str, Any] = field(default_factory=lambda: BASELINE)
+    name: ModelName = BASELINE
     weights: tuple[float, ...] = (1.0,)
     course: Course | None = None
     severity_exponent: float | None = None
@@ -48,7 +52,7 @@ class LearnedPrior:
 
     fleet: FleetPrior | None = None
     ended: tuple[ObservedLife, ...] = ()
-    name: Mapping[str, Any] = field(default_factory=lambda: {"name": WEAK, "version": None, "clutches": 0})
+    name: PriorName = WEAK_PRIOR
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -110,7 +114,7 @@ class Assumptions:
 
     def corrects_oil(self, quantity: str) -> bool:
         """Whether the model in force frees a quantity of the temperature of the oil that it was measured in."""
-        return quantity == MEAN_COF and "oil_temperature" in self.model.name["effects"]
+        return quantity == MEAN_COF and "oil_temperature" in self.model.name.effects
 
     def offsets(self, quantity: str, pressure: float, cycles: FloatArray) -> FloatArray:
         """What the model in force adds to a quantity under each of its draws at cycles since new [m]; [d, m], [1, m] where
@@ -124,17 +128,10 @@ class Assumptions:
         offsets = self.offsets(quantity, pressure, cycles)
         return np.asarray(offsets[0] if len(offsets) == 1 else np.array(self.model.weights) @ offsets)
 
-    def named(self) -> dict[str, Any]:
-        """The model, the prior and the severity behind an answer, as it names them."""
-        return {
-            "model": dict(self.model.name),
-            "prior": dict(self.prior.name),
-            "severity": severity_name(self.severity),
-        }
 
-
-def severity_name(severity: Severity) -> dict[str, Any]:
-    return {"basis": severity.basis.value, "exponent": severity.exponent}
+def severity_name(severity: Severity) -> SeverityName:
+    """What eq. 6 counts, as answers name it."""
+    return SeverityName(basis=severity.basis.value, exponent=severity.exponent)
 
 
 def severity_under(record: ClutchIn, exponent: float | None) -> Severity:
@@ -144,17 +141,17 @@ def severity_under(record: ClutchIn, exponent: float | None) -> Severity:
     return Severity(basis=SeverityBasis.DISSIPATED_ENERGY, exponent=exponent)
 
 
-def kind_of(record: ClutchIn, severity: Severity) -> dict[str, Any]:
+def kind_of(record: ClutchIn, severity: Severity) -> Kind:
     """What clutches must have in common to teach each other; a simulated one teaches no measured one."""
-    return {
-        "friction_material": record.friction_material,
-        "reaction_plate": record.reaction_plate,
-        "fluid": record.fluid,
-        "origin": record.origin,
-        "severity": severity_name(severity),
-    }
+    return Kind(
+        friction_material=record.friction_material,
+        reaction_plate=record.reaction_plate,
+        fluid=record.fluid,
+        origin=record.origin,
+        severity=severity_name(severity),
+    )
 
 
-def may_be_of(record: ClutchIn, kind: Mapping[str, Any]) -> bool:
+def may_be_of(record: ClutchIn, kind: Kind) -> bool:
     """Whether a clutch is of that kind but for its severity, which follows from what was adopted, too."""
-    return kind_of(record, Severity()) | {"severity": kind["severity"]} == kind
+    return kind_of(record, Severity()).model_copy(update={"severity": kind.severity}) == kind

@@ -6,11 +6,15 @@ only one where the line above a clutch's page and its action are written.
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Any
 
 from models.prognosis.criteria import FEWEST_TESTS, HORIZON
 from models.prognosis.first_passage import PassageStatus
+from service.api.clutch import ClutchSummary, LastRun, LatestDiagnosis, Recent
+from service.api.life import HeldRuns, LifePrediction
+from service.api.run import Warned
 from service.channels import whole
 from service.clutch.criteria import LONGEST_TEST, MAX_LINE_POINTS, NEAR_LIMIT, SOON
 from service.clutch.items import ENDED, INSUFFICIENT
@@ -57,28 +61,46 @@ def rank_of(summary: Mapping[str, Any]) -> float:
     return HORIZON if bound is None else min(bound, HORIZON)
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BesidePrediction:
+    """What an answer says beside its prediction: the safe bound and its date, the held runs and a warning about them (None:
+    none is held), and the remaining life in a sentence."""
+
+    at_least: float | None
+    at_least_at: str | None
+    counted_from: str | None
+    held_runs: HeldRuns | None
+    statement: str
+    warning: Warned | None
+
+    def of(self, prediction: LifePrediction) -> Mapping[str, Any]:
+        """These fields of an answer with its prediction."""
+        own: dict[str, Any] = {name: getattr(self, name) for name in BESIDE}
+        return own | {"warnings": [*prediction.warnings, *([] if self.warning is None else [self.warning])]}
+
+
 def with_held_runs(
     payload: Mapping[str, Any], summary: Mapping[str, Any], among: Mapping[str, Any] | None, count: int
-) -> dict[str, Any]:
-    """What an answer says beside its prediction: `held_runs` with what these, `count`, would make of it, which is `among`
-    (None: none is held), and the safe bound as the lower of both, with its date at the pace of the runs; `summary` is that
-    of the clutch, empty where the answer is of an earlier time or life."""
-    held_runs, warnings = None, list(payload["warnings"])
+) -> BesidePrediction:
+    """`held_runs` with what these, `count`, would make of a prediction, which is `among` (None: none is held), and the safe
+    bound as the lower of both, with its date at the pace of the runs; `summary` is that of the clutch, empty where the
+    answer is of an earlier time or life."""
+    held_runs, warning = None, None
     if among is not None:
-        held_runs = {"count": count} | {name: among[name] for name in ("status", "remaining_cycles")}
-        warnings.append(_warning_about_held_runs(payload, among, count))
+        held_runs = HeldRuns(count=count, status=among["status"], remaining_cycles=among["remaining_cycles"])
+        warning = _warning_about_held_runs(payload, among, count)
     at_least = lower_bound(payload["at_least"], among)
     at, since = None, None
     if at_least is not None and (pace := summary.get("pace")) is not None:
         at, since = date_of(pace["moment"] + at_least / pace["cycles_per_second"]), date_of(pace["moment"])
-    return {
-        "at_least": at_least,
-        "at_least_at": at,
-        "counted_from": since,
-        "held_runs": held_runs,
-        "statement": statement_of(payload, at_least),
-        "warnings": warnings,
-    }
+    return BesidePrediction(
+        at_least=at_least,
+        at_least_at=at,
+        counted_from=since,
+        held_runs=held_runs,
+        statement=statement_of(payload, at_least),
+        warning=warning,
+    )
 
 
 def pace_in_words(pace: Mapping[str, float] | None, cycles: float | None) -> str | None:
@@ -93,12 +115,13 @@ def pace_in_words(pace: Mapping[str, float] | None, cycles: float | None) -> str
     return f"{shown} at the pace so far, counted from the last run on {day.day} {day:%b %Y}"
 
 
-def stated(summary: Mapping[str, Any]) -> dict[str, Any] | None:
+def stated(summary: Mapping[str, Any]) -> ClutchSummary | None:
     """A clutch's summary as lists show it; None before the first run that counts."""
     if "status" not in summary:
         return None
-    beside = with_held_runs({**summary, "warnings": ()}, summary, _with_held(summary), summary.get("held", 0))
-    return {name: summary[name] for name in SUMMARY} | {name: beside[name] for name in BESIDE}
+    beside = with_held_runs(summary, summary, _with_held(summary), summary.get("held", 0))
+    own = {name: summary[name] for name in SUMMARY} | {name: getattr(beside, name) for name in BESIDE}
+    return ClutchSummary(**own)
 
 
 def lower_bound(at_least: float | None, among: Mapping[str, Any] | None) -> float | None:
@@ -117,7 +140,7 @@ def bound_of(summary: Mapping[str, Any]) -> float | None:
     return lower_bound(summary["at_least"], _with_held(summary))
 
 
-def _warning_about_held_runs(payload: Mapping[str, Any], among: Mapping[str, Any], count: int) -> dict[str, str]:
+def _warning_about_held_runs(payload: Mapping[str, Any], among: Mapping[str, Any], count: int) -> Warned:
     """What held runs would make of an answer, by all that it states: where both are unknown the safe bounds may differ."""
     if all(among[name] == payload[name] for name in ("status", "remaining_cycles", "at_least")):
         effect = f"the remaining life would be the same with {_them(count)}"
@@ -129,13 +152,13 @@ def _warning_about_held_runs(payload: Mapping[str, Any], among: Mapping[str, Any
         effect = f"with {_them(count)} the remaining life is not known: {bound_in_words(among['at_least'])}"
     else:
         effect = f"with {_them(count)} {interval_in_words(among['remaining_cycles'])} cycles would remain"
-    return {"code": HELD_RUNS, "message": f"{held_in_words(count)}: {effect}"}
+    return Warned(code=HELD_RUNS, message=f"{held_in_words(count)}: {effect}")
 
 
-def held_runs_left_out(count: int) -> dict[str, Any]:
-    """What an answer that is without so many held runs says of them: `held_runs`, and a warning where there are some."""
+def held_runs_left_out(count: int) -> list[Warned]:
+    """The warning of an answer that is without so many held runs; none where none is held."""
     message = f"{held_in_words(count)}: this is without {_them(count)}"
-    return {"held_runs": count, "warnings": [{"code": HELD_RUNS, "message": message}] if count else []}
+    return [Warned(code=HELD_RUNS, message=message)] if count else []
 
 
 def _them(count: int) -> str:
@@ -183,7 +206,7 @@ def silence_in_words(since: str) -> str:
 
 
 def top_line(
-    summary: Mapping[str, Any], *, disputed: bool, diagnosis: Mapping[str, Any] | None = None, silent: str | None = None
+    summary: Mapping[str, Any], *, disputed: bool, diagnosis: LatestDiagnosis | None = None, silent: str | None = None
 ) -> dict[str, str]:
     """What stands first on a clutch's page and in `clutchlife status`: `headline`, its state in words, the safe bound in
     cycles and days, and the median; `action`, what to do. `diagnosis`: the newest one as it goes out."""
@@ -219,7 +242,7 @@ def _numbers_in_words(summary: Mapping[str, Any], at_least: float | None, paced:
     return f"{bound}; 50 % chance of {round(median / unit) * unit:,.0f} or more"
 
 
-def _action(name: str, summary: Mapping[str, Any], soon: str, diagnosis: Mapping[str, Any] | None) -> str:
+def _action(name: str, summary: Mapping[str, Any], soon: str, diagnosis: LatestDiagnosis | None) -> str:
     """What to do about a state, in one sentence; `soon`: how soon."""
     held = summary.get("held", 0)
     if name == FAILURE:
@@ -240,12 +263,12 @@ def _action(name: str, summary: Mapping[str, Any], soon: str, diagnosis: Mapping
         return f"Run {tests}{alike}: then the remaining life is predicted."
     if name == NORMAL or diagnosis is None:
         return "Its life has ended: nothing to do." if summary.get("ended") else "Nothing to do: carry on testing."
-    causes = [_cause_in_words(cause) for cause in diagnosis["causes"]]
-    if diagnosis["adoptable"] and diagnosis["verdict"] == NAMED:
+    causes = [_cause_in_words(cause) for cause in diagnosis.causes]
+    if diagnosis.adoptable and diagnosis.verdict == NAMED:
         return f"Adopt the model with {' and '.join(causes)}: it explains where data and model disagree."
-    if (advice := diagnosis["advice"]) is not None:
-        unclear = "The cause is not clear yet. " if diagnosis["verdict"] == AMBIGUOUS else ""
-        return f"{unclear}Run {_test_in_words(advice['test'])}: {_decides(advice['separates'])}."
+    if (advice := diagnosis.advice) is not None:
+        unclear = "The cause is not clear yet. " if diagnosis.verdict == AMBIGUOUS else ""
+        return f"{unclear}Run {_test_in_words(advice.test)}: {_decides(advice.separates)}."
     return "Read the diagnosis before you rely on the forecast."
 
 
@@ -365,7 +388,7 @@ def chance_in_words(probability: float) -> str:
     return "less than 1 %" if probability < 0.005 else f"{math.floor(100 * probability + 0.5)} %"
 
 
-def recent(events: Sequence[Event], series: Series) -> dict[str, Any]:
+def recent(events: Sequence[Event], series: Series) -> Recent:
     """The run that was made last, and mean COF [-] of the present life as a short line, thinned evenly, its last value kept.
 
     `events` is not empty; `series` is mean COF over the reference pressures, ordered by cycles.
@@ -373,12 +396,12 @@ def recent(events: Sequence[Event], series: Series) -> dict[str, Any]:
     last = max(events, key=lambda event: event.moment)
     values = [measurement.value for measurement in series.measurements]
     step = -(-len(values) // MAX_LINE_POINTS)  # rounded up
-    return {
-        "last_run": {
-            "run_id": last.run_id,
-            "kind": last.kind,
-            "cycles": whole(last.cycles),
-            "at": datetime.fromtimestamp(last.moment, UTC).isoformat(timespec="seconds"),
-        },
-        "mean_cof": [round(value, 6) for value in values[::-1][:: step or 1]][::-1],
-    }
+    return Recent(
+        last_run=LastRun(
+            run_id=last.run_id,
+            kind=last.kind,
+            cycles=whole(last.cycles),
+            at=datetime.fromtimestamp(last.moment, UTC).isoformat(timespec="seconds"),
+        ),
+        mean_cof=[round(value, 6) for value in values[::-1][:: step or 1]][::-1],
+    )

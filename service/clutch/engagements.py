@@ -15,6 +15,8 @@ from models.clutch import Geometry
 from models.engagements.comparison import Comparison, SpeedCourse, compared, reference_of, same_duty
 from models.engagements.measured import EngagementIndicators, measured_engagement
 from models.engagements.slip import Refusal, ValueWithError
+from service.api.over_life import AllIndicators, MeasuredEngagement
+from service.api.run import Evaluation, IndicatorEstimate, Indicators, ReceivedEngagement
 from service.channels import CHANNELS, PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM
 from service.clutch.incoming_run import IncomingRun, sampled_record
 from service.errors import Notice
@@ -76,41 +78,45 @@ def engagement_notices(engagement: Engagement | None) -> list[Notice]:
     return [Notice(code="no_engagement", message=message)]
 
 
-def engagement_item(engagement: Engagement) -> dict[str, Any]:
+def engagement_item(engagement: Engagement) -> ReceivedEngagement:
     """An engagement as a receipt shows it; null is what the record does not determine."""
     if isinstance(engagement, Refusal):
-        nothing = ("start_s", "end_s", "initial_speed_rpm", "maximum_pressure_bar")
-        return {
-            "status": engagement.status.value,
-            "message": engagement.message,
-            **dict.fromkeys(nothing),
-            "indicators": dict.fromkeys(INDICATORS),
-        }
+        return ReceivedEngagement(
+            status=engagement.status.value,
+            message=engagement.message,
+            start_s=None,
+            end_s=None,
+            initial_speed_rpm=None,
+            maximum_pressure_bar=None,
+            indicators=Indicators(**dict.fromkeys(INDICATORS)),
+        )
     slip = engagement.slip
-    return {
-        "status": "determined",
-        "message": f"The clutch slipped for {engagement.stop_time.value:.3g} s.",
-        "start_s": slip.start.value,
-        "end_s": slip.end.value,
-        "initial_speed_rpm": engagement.initial_speed.value / RADIANS_PER_SECOND_PER_RPM,
-        "maximum_pressure_bar": engagement.maximum_pressure / PASCALS_PER_BAR,
-        "indicators": _indicator_items(engagement, INDICATORS),
-    }
+    return ReceivedEngagement(
+        status="determined",
+        message=f"The clutch slipped for {engagement.stop_time.value:.3g} s.",
+        start_s=slip.start.value,
+        end_s=slip.end.value,
+        initial_speed_rpm=engagement.initial_speed.value / RADIANS_PER_SECOND_PER_RPM,
+        maximum_pressure_bar=engagement.maximum_pressure / PASCALS_PER_BAR,
+        indicators=Indicators(**_indicator_items(engagement, INDICATORS)),
+    )
 
 
 def _indicator_items(
     found: EngagementIndicators | Comparison, indicators: Mapping[str, Indicator]
-) -> dict[str, dict[str, float] | None]:
+) -> dict[str, IndicatorEstimate | None]:
     """Each indicator with its standard error in the public unit; null where it is not determined."""
-    items: dict[str, dict[str, float] | None] = {}
+    items: dict[str, IndicatorEstimate | None] = {}
     for name, indicator in indicators.items():
         estimate: ValueWithError | None = getattr(found, indicator.field)
         factor = indicator.factor
-        items[name] = None if estimate is None else {"value": estimate.value / factor, "sd": estimate.sd / factor}
+        items[name] = (
+            None if estimate is None else IndicatorEstimate(value=estimate.value / factor, sd=estimate.sd / factor)
+        )
     return items
 
 
-def course_item(engagement: Engagement | None) -> dict[str, Any]:
+def course_item(engagement: Engagement | None) -> dict[str, object]:
     """What is kept of the sliding speed beside a run's channels; empty for a run without an engagement."""
     if not isinstance(engagement, EngagementIndicators):
         return {}
@@ -137,46 +143,47 @@ def public_channels(columns: Mapping[str, FloatArray]) -> dict[str, list[float]]
 class StoredEngagement:
     """What is stored of a run with an engagement: its receipt, and the course of speed where it was evaluated."""
 
-    receipt: Mapping[str, Any]
+    receipt: Evaluation
+    item: ReceivedEngagement
     course: SpeedCourse | None
 
     @property
     def run_id(self) -> str:
-        return str(self.receipt["run_id"])
+        return self.receipt.run_id
 
     @property
-    def item(self) -> Mapping[str, Any]:
-        item: Mapping[str, Any] = self.receipt["engagement"]
-        return item
+    def duty(self) -> tuple[float, float]:
+        """Initial speed [rpm] and maximum pressure [bar] of an evaluated engagement."""
+        return self.item.initial_speed_rpm or 0.0, self.item.maximum_pressure_bar or 0.0
 
     def has_duty_of(self, other: "StoredEngagement") -> bool:
         """Whether it is of the same duty as another, both evaluated."""
-        return all(
-            same_duty(self.item[name], other.item[name]) for name in ("initial_speed_rpm", "maximum_pressure_bar")
-        )
+        return all(same_duty(own, its) for own, its in zip(self.duty, other.duty, strict=True))
 
 
-def stored_engagement(receipt: Mapping[str, Any], details: Mapping[str, Any]) -> StoredEngagement | None:
-    """A stored run's engagement; None where it has none, or was evaluated by a release that knew of none."""
-    if receipt.get("engagement") is None:
+def stored_engagement(receipt: Evaluation, details: Mapping[str, Any]) -> StoredEngagement | None:
+    """A stored run's engagement; None where it has none."""
+    if receipt.engagement is None:
         return None
     if COURSE not in details:
-        return StoredEngagement(receipt=receipt, course=None)
+        return StoredEngagement(receipt=receipt, item=receipt.engagement, course=None)
     kept = details[COURSE]
     course = SpeedCourse(
         duration=ValueWithError(value=kept["duration_s"], sd=kept["duration_sd_s"]),
         speed=np.array(kept["speed_rpm"]) * RADIANS_PER_SECOND_PER_RPM,
         noise=kept["noise_rpm"] * RADIANS_PER_SECOND_PER_RPM,
     )
-    return StoredEngagement(receipt=receipt, course=course)
+    return StoredEngagement(receipt=receipt, item=receipt.engagement, course=course)
 
 
-def engagements_over_life(stored: Sequence[StoredEngagement], lives: Sequence[Collection[str]]) -> list[dict[str, Any]]:
+def engagements_over_life(
+    stored: Sequence[StoredEngagement], lives: Sequence[Collection[str]]
+) -> list[MeasuredEngagement]:
     """The evaluated engagements in the order given, each with all indicators; `lives` are the run_ids of each life."""
     rows = []
     for life in lives:
         of_life = [engagement for engagement in stored if engagement.run_id in life and engagement.course is not None]
-        first = [engagement for engagement in of_life if engagement.receipt["kind"] == DUTY_KINDS[0]]
+        first = [engagement for engagement in of_life if engagement.receipt.kind == DUTY_KINDS[0]]
         first = [engagement for engagement in first if engagement.has_duty_of(first[0])][:3]  # three make the reference
         courses = [engagement.course for engagement in first if engagement.course is not None]
         reference = reference_of(courses) if courses else None
@@ -186,12 +193,18 @@ def engagements_over_life(stored: Sequence[StoredEngagement], lives: Sequence[Co
     return rows
 
 
-def _row(engagement: StoredEngagement, reference: SpeedCourse | None) -> dict[str, Any]:
-    head = {name: engagement.receipt[name] for name in ("run_id", "cycles", "kind")}
-    item = {name: engagement.item[name] for name in ("initial_speed_rpm", "maximum_pressure_bar")}
-    time = {"time": engagement.receipt["started_at"] or engagement.receipt["received_at"]}
+def _row(engagement: StoredEngagement, reference: SpeedCourse | None) -> MeasuredEngagement:
     if reference is None or engagement.course is None:
-        comparison: dict[str, dict[str, float] | None] = dict.fromkeys(COMPARED)
+        comparison: dict[str, IndicatorEstimate | None] = dict.fromkeys(COMPARED)
     else:
         comparison = _indicator_items(compared(engagement.course, reference), COMPARED)
-    return head | time | item | {"indicators": engagement.item["indicators"] | comparison}
+    receipt, (speed, pressure) = engagement.receipt, engagement.duty
+    return MeasuredEngagement(
+        run_id=receipt.run_id,
+        cycles=receipt.cycles,
+        kind=receipt.kind,
+        time=receipt.started_at or receipt.received_at,
+        initial_speed_rpm=speed,
+        maximum_pressure_bar=pressure,
+        indicators=AllIndicators(**dict(engagement.item.indicators), **comparison),
+    )

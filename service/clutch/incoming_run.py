@@ -11,6 +11,7 @@ from models.records.cleaning import stands
 from models.records.criteria import UNLOADED
 from models.records.pressure_levels import levels_of
 from models.records.runs import Plateaus, Record
+from service.api.base import Origin
 from service.channels import CHANNELS, PLATE_TEMPERATURES, content_with_columns, instant
 from service.clutch.criteria import MAX_LEVELS, MIN_TORQUE_SD
 from service.errors import InvalidError
@@ -30,7 +31,7 @@ class IncomingRun:
     run_id: str
     content_sha256: str = ""
     started_at: str | None = None
-    origin: str = "measured"
+    origin: Origin = "measured"
     channels: Mapping[str, FloatArray] = field(default_factory=dict)
     details: Mapping[str, Any] = field(default_factory=dict)
     file: Mapping[str, Any] | None = None

@@ -1,15 +1,17 @@
 """Receipts and predictions as JSON, in the names and units of the API."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Final
 
 from models.friction.identification import StribeckFit
 from models.loops.loops import FrictionLoop
 from models.prognosis.criteria import HORIZON, QUANTILES
 from models.prognosis.first_passage import horizon_at
+from service.api.life import BackCastCount, Criterion, Current, DeclaredEnd, LifePrediction, Quantiles
+from service.api.run import Evaluation, Fit, Loop, Parameters, ReceivedFile, Warned
 from service.channels import bar, whole
 from service.clutch.analysis import Analysis, LevelFit, Value
-from service.clutch.assumptions import ALL_PRESSURES, MEAN_COF, Assumptions
+from service.clutch.assumptions import ALL_PRESSURES, MEAN_COF, Assumptions, severity_name
 from service.clutch.engagements import engagement_item
 from service.clutch.incoming_run import IncomingRun
 from service.clutch.timeline import WORN, ByPressure, Event
@@ -24,7 +26,8 @@ PARAMETER_UNITS = {
     "viscous_coefficient": ("viscous_coefficient", "Nm/(m/s)^0.3"),
 }
 #: States of a prediction in which nothing is predicted any more, or not yet.
-INSUFFICIENT, ENDED = "insufficient_data", "ended"
+INSUFFICIENT: Final = "insufficient_data"
+ENDED: Final = "ended"
 #: The quantile of the end of life that is the safe bound.
 SAFE = min(QUANTILES)
 
@@ -37,37 +40,39 @@ def receipt(
     received_at: str,
     cofs: ByPressure | None = None,
     loops: Sequence[FrictionLoop] = (),
-) -> dict[str, Any]:
+) -> Evaluation:
     """The receipt of a run by itself; its mean COFs and loops where they are known already."""
-    return {
-        "clutch_id": clutch_id,
-        "run_id": run.run_id,
-        "kind": run.kind,
-        "cycles": whole(run.cycles),
-        "started_at": run.started_at,
-        "origin": run.origin,
-        "received_at": received_at,
-        "content_sha256": run.content_sha256,
-        "duplicate": False,
-        "file": None if run.file is None else {name: run.file[name] for name in ("filename", "sha256", "bytes", "rig")},
-        "warnings": [*(run.file or {}).get("warnings", ()), *notice_items(analysis.warnings)],
-        "fits": fit_items(analysis.fits, cofs or {}),
-        "loops": loop_items(loops),
-        "engagement": None if analysis.engagement is None else engagement_item(analysis.engagement),
-        "duty": run.details.get("duty"),
-        "event": run.details.get("event"),
-        "reason": run.details.get("reason"),
-        "note": run.details.get("note"),
-        "code_version": CODE_VERSION,
-    }
+    file = run.file or {}
+    return Evaluation(
+        clutch_id=clutch_id,
+        run_id=run.run_id,
+        kind=run.kind,
+        cycles=whole(run.cycles),
+        started_at=run.started_at,
+        origin=run.origin,
+        received_at=received_at,
+        content_sha256=run.content_sha256,
+        duplicate=False,
+        file=ReceivedFile(**{name: file[name] for name in ReceivedFile.model_fields}) if file else None,
+        warnings=[*warnings_of_file(run), *warned(analysis.warnings)],
+        fits=fit_items(analysis.fits, cofs or {}),
+        loops=loop_items(loops),
+        engagement=None if analysis.engagement is None else engagement_item(analysis.engagement),
+        duty=run.details.get("duty"),
+        event=run.details.get("event"),
+        reason=run.details.get("reason"),
+        note=run.details.get("note"),
+        code_version=CODE_VERSION,
+    )
 
 
-def fit_items(levels: Sequence[LevelFit], cofs: ByPressure) -> list[dict[str, Any]]:
+def fit_items(levels: Sequence[LevelFit], cofs: ByPressure) -> list[Fit]:
     """The fits of a test as a receipt shows them, each with its mean COF where it determines one."""
     return [_fit_item(level.fit, cofs.get(level.fit.pressure, (None, None))) for level in levels]
 
 
-def notice_items(notices: Sequence[Notice]) -> list[dict[str, Any]]:
+def doubted(notices: Sequence[Notice]) -> list[dict[str, object]]:
+    """Notices as the doubts about a run, which are stored."""
     return [
         {"code": notice.code, "message": notice.message}
         | ({} if notice.likely_cycles is None else {"likely_cycles": whole(notice.likely_cycles)})
@@ -75,66 +80,82 @@ def notice_items(notices: Sequence[Notice]) -> list[dict[str, Any]]:
     ]
 
 
-def _fit_item(fit: StribeckFit, cof: Value | tuple[None, None]) -> dict[str, Any]:
+def warned(notices: Sequence[Notice]) -> list[Warned]:
+    """Notices as the warnings of an answer."""
+    return [Warned(code=notice.code, message=notice.message) for notice in notices]
+
+
+def warnings_of_file(run: IncomingRun) -> list[Warned]:
+    """The warnings of reading the file that a run was sent as."""
+    return [Warned(code=each["code"], message=each["message"]) for each in (run.file or {}).get("warnings", ())]
+
+
+def _fit_item(fit: StribeckFit, cof: Value | tuple[None, None]) -> Fit:
     names = [public for public, _ in PARAMETER_UNITS.values()]
-    return {
-        "pressure_bar": bar(fit.pressure),
-        "parameters": dict(zip(names, map(float, fit.parameters.as_array()), strict=True)),
-        "standard_errors": dict(zip(names, map(float, fit.covariance.diagonal() ** 0.5), strict=True)),
-        "mse_percent": fit.mse_percent,
-        "rmse_nm": fit.rmse,
-        "noise_nm": fit.noise,
-        "acceptable": fit.acceptable,
-        "mean_cof": cof[0],
-        "mean_cof_sd": cof[1],
-        "points": fit.points,
-        "status": fit.status.value,
-        "undetermined": [PARAMETER_UNITS[name][0] for name in fit.undetermined],
-        "message": fit.message,
-    }
+    return Fit(
+        pressure_bar=bar(fit.pressure),
+        parameters=Parameters(**dict(zip(names, map(float, fit.parameters.as_array()), strict=True))),
+        standard_errors=Parameters(**dict(zip(names, map(float, fit.covariance.diagonal() ** 0.5), strict=True))),
+        mse_percent=fit.mse_percent,
+        rmse_nm=fit.rmse,
+        noise_nm=fit.noise,
+        acceptable=fit.acceptable,
+        mean_cof=cof[0],
+        mean_cof_sd=cof[1],
+        points=fit.points,
+        status=fit.status.value,
+        undetermined=[PARAMETER_UNITS[name][0] for name in fit.undetermined],
+        message=fit.message,
+    )
 
 
-def loop_items(loops: Sequence[FrictionLoop]) -> list[dict[str, Any]]:
+def loop_items(loops: Sequence[FrictionLoop]) -> list[Loop]:
+    """The friction loops of a test as a receipt shows them."""
     return [
-        {
-            "pressure_bar": bar(loop.pressure),
-            "loop_area_nm_m_s": loop.area,
-            "loop_area_sd_nm_m_s": loop.area_sd,
-            "attractor_nm_s": loop.attractor,
-            "attractor_sd_nm_s": loop.attractor_sd,
-            "film_time_s": loop.film_time,
-            "film_time_sd_s": loop.film_time_sd,
-            "frequency_hz": loop.frequency,
-            "periods": loop.periods,
-            "direction": str(loop.direction.value),
-            "better_law": loop.better_law,
-            "status": loop.status.value,
-            "message": loop.message,
-        }
+        Loop(
+            pressure_bar=bar(loop.pressure),
+            loop_area_nm_m_s=loop.area,
+            loop_area_sd_nm_m_s=loop.area_sd,
+            attractor_nm_s=loop.attractor,
+            attractor_sd_nm_s=loop.attractor_sd,
+            film_time_s=loop.film_time,
+            film_time_sd_s=loop.film_time_sd,
+            frequency_hz=loop.frequency,
+            periods=loop.periods,
+            direction=str(loop.direction.value),
+            better_law=loop.better_law,
+            status=loop.status.value,
+            message=loop.message,
+        )
         for loop in loops
     ]
 
 
-def insufficient(assumptions: Assumptions, cycles: float | None, pressure: float, fraction: float) -> dict[str, Any]:
+def insufficient(assumptions: Assumptions, cycles: float | None, pressure: float, fraction: float) -> LifePrediction:
     """The answer where nothing can be predicted: `insufficient_data`."""
-    return {
-        "as_of_cycles": None if cycles is None else whole(cycles),
-        "runs_used": 0,
-        "status": INSUFFICIENT,
-        "criterion": criterion_item(fraction, pressure, None, None),
-        "current": dict.fromkeys(("mean_cof", "mean_cof_sd", "measured_at_cycles", "fraction_of_initial", "health")),
-        "remaining_cycles": by_quantile({}),
-        "end_of_life_cycles": by_quantile({}),
-        "at_least": None,
-        "probability_of_reaching": None,
-        "course": None,
-        "back_cast": {"held": 0, "of": 0, "widening": 1.0},
-        "ended_lives": 0,
-        "ended": None,
-        "sample": None,
-        "horizon_cycles": whole(HORIZON),
-        "warnings": [],
-    } | assumptions.named()
+    return LifePrediction(
+        as_of_cycles=None if cycles is None else whole(cycles),
+        runs_used=0,
+        status=INSUFFICIENT,
+        criterion=criterion_item(fraction, pressure, None, None),
+        current=Current(
+            mean_cof=None, mean_cof_sd=None, measured_at_cycles=None, fraction_of_initial=None, health=None
+        ),
+        remaining_cycles=by_quantile({}),
+        end_of_life_cycles=by_quantile({}),
+        at_least=None,
+        probability_of_reaching=None,
+        course=None,
+        back_cast=BackCastCount(held=0, of=0, widening=1.0),
+        ended_lives=0,
+        ended=None,
+        sample=None,
+        horizon_cycles=whole(HORIZON),
+        warnings=[],
+        model=assumptions.model.name,
+        prior=assumptions.prior.name,
+        severity=severity_name(assumptions.severity),
+    )
 
 
 def share_of_way(value: float, initial: float, limit: float, *, rises: bool = False) -> float | None:
@@ -150,38 +171,38 @@ def safe_bound(end: float | None, now: float, origin: float) -> float:
     return max(0.0, (origin + horizon_at(now - origin) if end is None else end) - now)
 
 
-def ended(payload: Mapping[str, Any], end: Event | None) -> dict[str, Any]:
+def ended(prediction: LifePrediction, end: Event | None) -> LifePrediction:
     """A prediction after the declared `end` of its life (None: it goes on): nothing remains of a worn one.
 
     One that was taken out for another reason has no remaining life either; where it would have ended stays predicted.
     """
-    if end is None:
-        return dict(payload)
+    if end is None or end.end is None:
+        return prediction
     at = whole(end.cycles)
-    declared = {"status": ENDED, "ended": {"cycles": at, "reason": end.end, "run_id": end.run_id}}
+    declared = {"status": ENDED, "ended": DeclaredEnd(cycles=at, reason=end.end, run_id=end.run_id)}
     if end.end != WORN:
-        return {**payload, **declared, "remaining_cycles": by_quantile({}), "at_least": None}
-    return {
-        **payload,
-        **declared,
-        "current": {**payload["current"], "health": 0.0},
+        return prediction.model_copy(update={**declared, "remaining_cycles": by_quantile({}), "at_least": None})
+    worn = {
+        "current": prediction.current.model_copy(update={"health": 0.0}),
         "remaining_cycles": by_quantile(dict.fromkeys(QUANTILES, 0.0)),
         "at_least": 0.0,
         "end_of_life_cycles": by_quantile(dict.fromkeys(QUANTILES, float(at))),
         "probability_of_reaching": 1.0,
     }
+    return prediction.model_copy(update=declared | worn)
 
 
-def criterion_item(fraction: float, pressure: float, initial: float | None, threshold: float | None) -> dict[str, Any]:
-    return {
-        "quantity": MEAN_COF,
-        "fraction": fraction,
-        "initial_mean_cof": initial,
-        "threshold_mean_cof": threshold,
-        "pressure_bar": None if pressure == ALL_PRESSURES else bar(pressure),
-    }
+def criterion_item(fraction: float, pressure: float, initial: float | None, threshold: float | None) -> Criterion:
+    """The criterion on mean COF over a pressure [Pa]."""
+    return Criterion(
+        quantity=MEAN_COF,
+        fraction=fraction,
+        initial_mean_cof=initial,
+        threshold_mean_cof=threshold,
+        pressure_bar=None if pressure == ALL_PRESSURES else bar(pressure),
+    )
 
 
-def by_quantile(values: Mapping[float, float | None]) -> dict[str, float | None]:
+def by_quantile(values: Mapping[float, float | None]) -> Quantiles:
     """A number by quantile, in the public shape; null where there is none."""
     return {f"{quantile:g}": values.get(quantile) for quantile in QUANTILES}

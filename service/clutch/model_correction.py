@@ -22,6 +22,7 @@ from models.diagnosis.campaign import Campaign, StationaryRun
 from models.prognosis.criteria import HORIZON
 from models.records.runs import Plateaus, loaded
 from service.api.clutch import ClutchIn
+from service.api.life import ModelName
 from service.clutch.analysis import levels_of, mean_cofs
 from service.clutch.assumptions import ALL_PRESSURES, Course, ModelInForce
 from service.clutch.criteria import COURSE_PROBES
@@ -147,7 +148,7 @@ def model_in_force(extension: Extension | None, life: Life | None, geometry: Geo
     if extension is None or life is None:
         return ModelInForce()
     return ModelInForce(
-        name={"name": "extended", "effects": list(extension.effects)},
+        name=ModelName(name="extended", effects=list(extension.effects)),
         weights=tuple(extension.weights.tolist()),
         course=added_course(extension, life, geometry),
         severity_exponent=extension.severity_exponent,

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 from models.prognosis.back_cast import BackCast
 from models.prognosis.course_shares import CourseName, CourseProbability
@@ -13,9 +12,11 @@ from models.tracking.innovation import last_innovation
 from models.tracking.measurement import Measurement
 from models.tracking.posterior import TrackPosterior
 from models.tracking.prior import TrackPrior
+from service.api.life import LifePrediction
+from service.api.run import Evaluation, Warned
 from service.channels import ZERO_CELSIUS, bar
 from service.clutch.criteria import EQ_6_DOUBTED, OTHER_OIL
-from service.clutch.items import ENDED, INSUFFICIENT, notice_items, share_of_way
+from service.clutch.items import ENDED, INSUFFICIENT, share_of_way, warned
 from service.clutch.timeline import ByPressure, Event, Life, Series, latest_before, nearest
 from service.errors import Notice
 
@@ -68,11 +69,11 @@ def missed(back_cast: BackCast) -> list[Notice]:
     return [Notice(code="missed_forecasts", message=message)]
 
 
-def filters_disagree(answers: Mapping[str, Mapping[str, Any]]) -> list[Notice]:
+def filters_disagree(answers: Mapping[str, LifePrediction]) -> list[Notice]:
     """The warning where a filter's median lies outside another's 90 % interval, of predictions by their method."""
-    predictions = {m: a["remaining_cycles"] for m, a in answers.items() if a["status"] not in (INSUFFICIENT, ENDED)}
+    predictions = {m: a.remaining_cycles for m, a in answers.items() if a.status not in (INSUFFICIENT, ENDED)}
     ends = [
-        [math.inf if prediction[q] is None else prediction[q] for q in ("0.05", "0.5", "0.95")]
+        [math.inf if (cycles := prediction[q]) is None else cycles for q in ("0.05", "0.5", "0.95")]
         for prediction in predictions.values()
     ]
     if all(low <= median <= high for low, _, high in ends for _, median, _ in ends):
@@ -162,15 +163,15 @@ def other_oil_notice(life: Life, event: Event) -> list[Notice]:
 
 
 def history_warnings(
-    lives: Sequence[Life], off_track: Mapping[str, list[dict[str, str]]], *, run_id: str | None = None
-) -> dict[str, list[dict[str, str]]]:
+    lives: Sequence[Life], off_track: Mapping[str, list[Warned]], *, run_id: str | None = None
+) -> dict[str, list[Warned]]:
     """run_id -> the warnings of every run in its history, or of one; `off_track` are those of predictions after tests."""
     latest = latest_before([event for life in lives for event in life.events])
     return {
         event.run_id: [
-            *notice_items(late_arrival(event.cycles, latest[event.run_id])),
-            *notice_items(other_pressures_notice(life.reference, event.cofs)),
-            *notice_items(other_oil_notice(life, event)),
+            *warned(late_arrival(event.cycles, latest[event.run_id])),
+            *warned(other_pressures_notice(life.reference, event.cofs)),
+            *warned(other_oil_notice(life, event)),
             *off_track.get(event.run_id, ()),
         ]
         for life in lives
@@ -180,13 +181,13 @@ def history_warnings(
 
 
 def warned_again(
-    lives: Sequence[Life], off_track: Mapping[str, list[dict[str, str]]], receipts: Mapping[str, dict[str, Any]]
-) -> dict[str, dict[str, Any]]:
+    lives: Sequence[Life], off_track: Mapping[str, list[Warned]], receipts: Mapping[str, Evaluation]
+) -> dict[str, Evaluation]:
     """The receipts whose warnings of the history change."""
     changed = {}
     for run_id, noticed in history_warnings(lives, off_track).items():
-        before = receipts[run_id]["warnings"]
-        after = [warning for warning in before if warning["code"] not in OF_HISTORY] + noticed
+        before = receipts[run_id].warnings
+        after = [warning for warning in before if warning.code not in OF_HISTORY] + noticed
         if after != before:
-            changed[run_id] = receipts[run_id] | {"warnings": after}
+            changed[run_id] = receipts[run_id].model_copy(update={"warnings": after})
     return changed

@@ -16,6 +16,8 @@ from models.clutch import Geometry
 from models.degradation.severity import Severity
 from models.diagnosis.campaign import StationaryRun
 from service.api.clutch import ClutchIn
+from service.api.fleet import Kind
+from service.api.run import Evaluation, Loop, Warned
 from service.clutch import timeline
 from service.clutch.analysis import Analysis, LevelFit, loops_of, mean_cofs
 from service.clutch.assumptions import Assumptions, LearnedPrior, kind_of, severity_under
@@ -34,7 +36,6 @@ if TYPE_CHECKING:
 
 #: The levels of stationary tests by run_id.
 Levels = Mapping[str, Sequence[LevelFit]]
-Receipt = dict[str, Any]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -103,7 +104,8 @@ class ClutchHistory:
         return adoption.extension if adoption is not None and adoption.life == name else None
 
     @property
-    def kind(self) -> dict[str, Any]:
+    def kind(self) -> Kind:
+        """What clutches have in common with it that teach it and that it teaches."""
         return kind_of(self.record, self.assumptions().severity)
 
     def assumptions(self) -> Assumptions:
@@ -113,7 +115,7 @@ class ClutchHistory:
     def _assumptions(self) -> Assumptions:
         return self.assumptions_under(self.extension, self.lives[-1] if self.events else None)
 
-    def __getstate__(self) -> dict[str, Any]:
+    def __getstate__(self) -> dict[str, object]:
         """What follows from the state is not sent to another process."""
         return {field.name: getattr(self, field.name) for field in fields(self)}
 
@@ -131,7 +133,7 @@ class Tracking:
 
     predictions: tuple[TrackPrediction, ...] = ()
     filters: States = field(default_factory=dict)
-    warnings: Mapping[str, list[dict[str, str]]] = field(default_factory=dict)
+    warnings: Mapping[str, list[Warned]] = field(default_factory=dict)
     again: bool = True
 
 
@@ -144,20 +146,20 @@ class Results:
 
     levels: Levels = field(default_factory=dict)
     cofs: Mapping[str, timeline.ByPressure] = field(default_factory=dict)
-    receipts: Mapping[str, Receipt] = field(default_factory=dict)
-    details: Mapping[str, dict[str, Any]] = field(default_factory=dict)
+    receipts: Mapping[str, Evaluation] = field(default_factory=dict)
+    details: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
     corrected: Mapping[str, timeline.Corrected] = field(default_factory=dict)
     corrected_again: bool = False
     tracking: Tracking | None = None
-    summary: dict[str, Any] | None = None
+    summary: Mapping[str, Any] | None = None
     judged: Judged = field(default_factory=Judged)
-    teaches: dict[str, Any] | None = None
+    teaches: Kind | None = None
 
 
 def computed_again(
     state: ClutchHistory,
     levels: Levels,
-    receipts: Mapping[str, Receipt],
+    receipts: Mapping[str, Evaluation],
     reader: RunReader,
     *,
     evaluated: Mapping[str, str | None],
@@ -168,9 +170,11 @@ def computed_again(
     COFs, and what is to be stored.
     """
     final, cofs, corrected = with_cofs(state, levels, reader)
-    fresh = {run_id: receipts[run_id] | {"fits": fit_items(levels[run_id], cofs[run_id])} for run_id in cofs}
+    fresh = {
+        run_id: receipts[run_id].model_copy(update={"fits": fit_items(levels[run_id], cofs[run_id])}) for run_id in cofs
+    }
     for run_id, items in loops_again(final, levels, reader, evaluated).items():
-        fresh[run_id] = receipts[run_id] | {"loops": items}
+        fresh[run_id] = receipts[run_id].model_copy(update={"loops": items})
     tracking = track(final)
     results = Results(
         levels={run_id: levels[run_id] for run_id in cofs},
@@ -213,7 +217,7 @@ def with_set_aside(
     state: ClutchHistory,
     events: Iterable[timeline.Event],
     levels: Levels,
-    receipts: Mapping[str, Receipt],
+    receipts: Mapping[str, Evaluation],
     reader: RunReader,
 ) -> Results:
     """The results with those of runs that are none of the history: their mean COFs and loops as they would be among it, and
@@ -226,8 +230,9 @@ def with_set_aside(
         evaluated.pop(name, None)
         loops = loops_again(state_with_event, levels, reader, evaluated).get(name, [])
         cofs[name], own_levels[name] = cofs_among(state, event, fits), fits
-        warnings = [warning for warning in receipts[name]["warnings"] if warning["code"] not in OF_HISTORY]
-        fresh[name] = receipts[name] | {"fits": fit_items(fits, cofs[name]), "loops": loops, "warnings": warnings}
+        warnings = [warning for warning in receipts[name].warnings if warning.code not in OF_HISTORY]
+        own = {"fits": fit_items(fits, cofs[name]), "loops": loops, "warnings": warnings}
+        fresh[name] = receipts[name].model_copy(update=own)
     return replace(computed, cofs=cofs, levels=own_levels, receipts=fresh)
 
 
@@ -269,7 +274,7 @@ def track(state: ClutchHistory, *, newest: timeline.Event | None = None) -> Trac
         walks[:0] = [(life, life.pooled(assumptions), {}, 0) for life in lives[:-1]]
     predictions: dict[tuple[float, str], TrackPrediction] = {}
     filters: States = {}
-    warnings: dict[str, list[dict[str, str]]] = {}
+    warnings: dict[str, list[Warned]] = {}
     for life, full_life, start, first_event in walks:
         measured = set(full_life.events)
         walk = follow(life, full_life, state.fraction, start, first_event=first_event)
@@ -277,8 +282,8 @@ def track(state: ClutchHistory, *, newest: timeline.Event | None = None) -> Trac
             filters = after_event
             predictions |= {(prediction.cycles, prediction.method): prediction for prediction in after_test}
             if index in measured:
-                shown = predictions[life.events[index].cycles, SHOWN].payload
-                odd = [warning for warning in shown["warnings"] if warning["code"] == OFF_TRACK]
+                shown = predictions[life.events[index].cycles, SHOWN].prediction
+                odd = [warning for warning in shown.warnings if warning.code == OFF_TRACK]
                 warnings[life.events[index].run_id] = odd
     return Tracking(predictions=tuple(predictions.values()), filters=filters, warnings=warnings, again=carried is None)
 
@@ -306,7 +311,7 @@ def _carried(
 
 def loops_again(
     state: ClutchHistory, levels: Levels, reader: RunReader, evaluated: Mapping[str, str | None]
-) -> dict[str, list[dict[str, Any]]]:
+) -> dict[str, list[Loop]]:
     """run_id -> loops of the dynamic tests that have another stationary test than that which they were `evaluated` against,
     by run_id; of those that are not there, too."""
     loops = {}
@@ -332,7 +337,8 @@ class Arrival:
     received_at: str
 
     @property
-    def kept(self) -> dict[str, Any]:
+    def kept(self) -> dict[str, object]:
+        """What is kept beside its channels."""
         return self.analysis.details_to_store(self.run) | (
             {} if self.shown is None else {"shown": self.shown.to_list()}
         )

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import astuple, dataclass, field, fields, replace
 from datetime import UTC, datetime
 from functools import cached_property
-from typing import Any
+from typing import Any, TypedDict, cast
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from models.friction.speed_protocol import protocol_speeds
 from models.records.criteria import LEVEL_GAP, LEVEL_GAP_SHARE
 from models.tracking.measurement import Measurement
 from models.tracking.prior import TrackPrior
+from service.api.run import EndReason
 from service.channels import RADIANS_PER_SECOND_PER_RPM
 from service.clutch.analysis import Value
 from service.clutch.assumptions import ALL_PRESSURES, MEAN_COF, Assumptions, Scale
@@ -85,7 +86,7 @@ class Event:
     cofs: ByPressure = field(default_factory=dict)
     rebuild: bool = False
     shift: bool = False
-    end: str | None = None
+    end: EndReason | None = None
     duty: Block | None = None
     dated: bool = False
     shown: Shown | None = None
@@ -354,12 +355,20 @@ def lives_of(events: Sequence[Event]) -> list[Life]:
     return [Life(origin=part[0].cycles if part[0].rebuild else 0.0, events=part) for part in parts]
 
 
-def maintenance_fields(event: str | None, reason: str | None) -> dict[str, Any]:
+class MaintenanceFields(TypedDict):
+    """What maintenance is in the history."""
+
+    rebuild: bool
+    shift: bool
+    end: EndReason | None
+
+
+def maintenance_fields(event: str | None, reason: str | None) -> MaintenanceFields:
     """What maintenance of that kind is in the history; of a run that is none, nothing."""
     return {
         "rebuild": event == REBUILD,
         "shift": event not in (None, REBUILD, END_OF_LIFE),
-        "end": reason if event == END_OF_LIFE else None,
+        "end": cast("EndReason | None", reason) if event == END_OF_LIFE else None,
     }
 
 

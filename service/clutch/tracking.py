@@ -26,6 +26,7 @@ from models.tracking.filters.ukf import Ukf, UkfState
 from models.tracking.measurement import Measurement
 from models.tracking.posterior import Tracker, TrackPosterior, mixture
 from models.tracking.prior import TrackPrior
+from service.api.life import BackCastCount, Course, CourseShare, LifePrediction, SampleQuality
 from service.channels import PASCALS_PER_BAR, bar, whole
 from service.clutch import items, notices
 from service.clutch.assumptions import ALL_PRESSURES, WEAK, Assumptions
@@ -55,7 +56,7 @@ class TrackPrediction:
 
     cycles: float
     method: str
-    payload: dict[str, Any]
+    prediction: LifePrediction
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -112,8 +113,8 @@ def follow(
             states = {method: advance(method, series, states.get(method), runs) for method in CARRIED}
         predictions = []
         for method in CARRIED:
-            payload = predict(method, series, states.get(method), cycles, fraction, tests=tests)
-            predictions.append(TrackPrediction(cycles=cycles, method=method, payload=items.ended(payload, so_far.end)))
+            made = predict(method, series, states.get(method), cycles, fraction, tests=tests)
+            predictions.append(TrackPrediction(cycles=cycles, method=method, prediction=items.ended(made, so_far.end)))
         yield states, predictions
 
 
@@ -218,8 +219,8 @@ def step_rng(purpose: str, series: Series, step: int) -> np.random.Generator:
 
 def predict(
     method: str, series: Series, tracked: Tracked | None, cycles: float, fraction: float, *, tests: int
-) -> dict[str, Any]:
-    """The prediction at `cycles` of a series, in the public shape; the life has so many `tests`.
+) -> LifePrediction:
+    """The prediction at `cycles` of a series; the life has so many `tests`.
 
     With too few of them only the last and the safe bound are stated.
     """
@@ -248,13 +249,14 @@ def predict(
         *notices.new_level([at for at in series.new_levels if at <= cycles]),
         *_off_track(sample, series, runs),
     ]
-    answer |= {
+    known = {
         "runs_used": runs,
-        "current": answer["current"] | measured,
+        "current": answer.current.model_copy(update=measured),
         "horizon_cycles": whole(horizon_cycles),
         "at_least": items.safe_bound(ends[items.SAFE], cycles, scale.origin),
-        "warnings": items.notice_items(warnings),
+        "warnings": items.warned(warnings),
     }
+    answer = answer.model_copy(update=known)
     if len({measurement.progress for measurement in series.measurements[:runs]}) < FEWEST_TESTS:
         return answer  # what else the prior makes of the tests is no finding
     courses, back_cast = course_shares(sample), tracked.back_cast
@@ -264,27 +266,28 @@ def predict(
         *notices.missed(back_cast),
     ]
     course, *alternatives = (
-        {"name": share.name.value, "probability": share.probability, "order": share.order} for share in courses
+        CourseShare(name=share.name.value, probability=share.probability, order=share.order) for share in courses
     )
     mean, deviation = passage.current
     left = mean / passage.initial if passage.initial > 0 else None
     health = None if left is None else items.share_of_way(left, 1.0, fraction)
     now = {"mean_cof": mean, "mean_cof_sd": deviation, "fraction_of_initial": left, "health": health}
-    return answer | {
+    predicted = {
         "status": passage.status.value,
         "criterion": items.criterion_item(fraction, series.pressure, passage.initial, passage.threshold),
-        "current": answer["current"] | now,
+        "current": answer.current.model_copy(update=now),
         "remaining_cycles": items.by_quantile(
             {q: None if at is None else max(0.0, at - cycles) for q, at in ends.items()}
         ),
         "end_of_life_cycles": items.by_quantile(ends),
         "probability_of_reaching": passage.probability_of_reaching,
-        "back_cast": {"held": back_cast.held, "of": back_cast.misses.size, "widening": back_cast.widening},
+        "back_cast": BackCastCount(held=back_cast.held, of=back_cast.misses.size, widening=back_cast.widening),
         "ended_lives": end.lives,
-        "sample": {"effective_draws": sample.effective_draws, "status": sample.status.value},
-        "course": {**course, "alternatives": alternatives},
-        "warnings": items.notice_items(warnings),
+        "sample": SampleQuality(effective_draws=sample.effective_draws, status=sample.status.value),
+        "course": Course(**dict(course), alternatives=alternatives),
+        "warnings": items.warned(warnings),
     }
+    return answer.model_copy(update=predicted)
 
 
 def _off_track(sample: TrackPosterior, series: Series, runs: int) -> list[Notice]:
@@ -341,7 +344,7 @@ def predict_at(
     at_cycles: float | None = None,
     back_cast: BackCast | None = None,
     carried: Tracked | None = None,
-) -> dict[str, Any]:
+) -> LifePrediction:
     """The prediction at one pressure of the reference test, or over all, as it would have been made at `at_cycles`.
 
     A `back_cast` that is known is not made again: of the exact filter it takes most of the time. A filter that was `carried`

@@ -7,13 +7,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from service.api.life import LifePrediction
+from service.api.over_life import MeasuredEngagement
+from service.api.run import Evaluation
 from service.clutch.condition import SHOWN, STORED, recent
 from service.clutch.engagements import StoredEngagement, engagements_over_life
 from service.clutch.items import ended
 from service.clutch.model_correction import RunReader
 from service.clutch.quantities.ends import CriterionEnd, criteria_answer, criterion_end
 from service.clutch.quantities.measured import ChosenLife, MeasuredLife, chosen_life
-from service.clutch.recomputation import ClutchHistory, Levels, Receipt, Tracking, with_cofs
+from service.clutch.recomputation import ClutchHistory, Levels, Tracking, with_cofs
 from service.clutch.timeline import Event, lives_of, moment_at, order, pace_of
 from service.clutch.tracking import CARRIED, States, predict_at
 from service.errors import NotFoundError
@@ -24,7 +27,7 @@ class ClutchMeasurements:
     """What was measured of a clutch by run_id, of its held runs too."""
 
     levels: Levels
-    receipts: Mapping[str, Receipt]
+    receipts: Mapping[str, Evaluation]
     engagements: Mapping[str, StoredEngagement]
     reader: RunReader | None = None
 
@@ -34,33 +37,30 @@ def needs_evidence(state: ClutchHistory) -> bool:
     return bool(state.held or state.record.end_of_life.criteria)
 
 
-def summarised(state: ClutchHistory, tracking: Tracking, evidence: ClutchMeasurements | None) -> dict[str, Any]:
+def summarised(state: ClutchHistory, tracking: Tracking, evidence: ClutchMeasurements | None) -> Mapping[str, Any]:
     """The summary of a clutch that was tracked; `evidence` is needed where `needs_evidence` says so."""
     if not state.events:
         return held_summary(state, {}, evidence)
     last, life = state.events[-1].cycles, state.lives[-1]
-    payload = next(
-        prediction.payload
-        for prediction in tracking.predictions
-        if (prediction.cycles, prediction.method) == (last, SHOWN)
-    )
+    prediction = next(made.prediction for made in tracking.predictions if (made.cycles, made.method) == (last, SHOWN))
     if evidence is not None:
-        payload = payload | by_own_criteria(state, SHOWN, payload, evidence, tracking.filters)
+        prediction = by_own_criteria(state, SHOWN, prediction, evidence, tracking.filters)
+    payload = prediction.model_dump(mode="json", exclude_unset=True)
     pace, pooled = pace_of(life.events), life.pooled(state.assumptions())
     summary = {name: payload[name] for name in STORED} | {
         "runs": len(state.events),
         "new_levels": [event.run_id for event in state.events if event.new_level],
-        "recent": recent(state.events, pooled),
+        "recent": recent(state.events, pooled).model_dump(mode="json"),
         "life": life.name,
         "from_cycles": life.origin,
         "tests": life.tests,
         "places": len({measurement.progress for measurement in pooled.measurements}),
         "pace": None if pace is None else {"cycles_per_second": pace, "moment": moment_at(life.events, pace, last)},
     }
-    return summary | held_summary(state, tracking.filters, evidence)
+    return {**summary, **held_summary(state, tracking.filters, evidence)}
 
 
-def held_summary(state: ClutchHistory, filters: States, evidence: ClutchMeasurements | None) -> dict[str, Any]:
+def held_summary(state: ClutchHistory, filters: States, evidence: ClutchMeasurements | None) -> Mapping[str, Any]:
     """What a summary says of the held runs: how many there are, and by each filter what would be predicted with them."""
     if not state.held or evidence is None:
         return {"held": len(state.held), "with_held": None}
@@ -79,29 +79,30 @@ def with_held(state: ClutchHistory, evidence: ClutchMeasurements) -> ClutchHisto
     return with_cofs(state_with_held, evidence.levels, evidence.reader)[0]
 
 
-def outlook(state: ClutchHistory, method: str, evidence: ClutchMeasurements, filters: States) -> dict[str, Any]:
+def outlook(state: ClutchHistory, method: str, evidence: ClutchMeasurements, filters: States) -> Mapping[str, Any]:
     """The remaining life by a filter and the clutch's own criteria; `filters` of other measurements are not carried on."""
-    payload = predict_at(state.events, state.assumptions(), state.fraction, method=method, carried=filters.get(method))
-    payload |= by_own_criteria(state, method, payload, evidence, filters)
-    return {name: payload[name] for name in ("status", "as_of_cycles", "remaining_cycles", "at_least")}
+    prediction = predict_at(
+        state.events, state.assumptions(), state.fraction, method=method, carried=filters.get(method)
+    )
+    prediction = by_own_criteria(state, method, prediction, evidence, filters)
+    return {name: getattr(prediction, name) for name in ("status", "as_of_cycles", "remaining_cycles", "at_least")}
 
 
 def by_own_criteria(
-    state: ClutchHistory, method: str, payload: Mapping[str, Any], evidence: ClutchMeasurements, filters: States
-) -> dict[str, Any]:
-    """The fields of a prediction that the criteria of the record change; empty if only mean COF ends its life."""
+    state: ClutchHistory, method: str, prediction: LifePrediction, evidence: ClutchMeasurements, filters: States
+) -> LifePrediction:
+    """A prediction by mean COF as the criteria of the record change it; unchanged if only mean COF ends its life."""
     criteria = state.record.end_of_life.criteria
     measured = measured_life(state, chosen_life(state), evidence, filters) if criteria else None
     if measured is None:
-        return {}
+        return prediction
     ends = []
     for criterion in criteria:
         try:
             ends.append(criterion_end(measured, criterion, method))
         except NotFoundError:  # measured, but not at the criterion's place: who asks for the remaining life is told so
             ends.append(CriterionEnd(criterion=criterion, tests=0))
-    by_criteria = criteria_answer(measured, ends, payload["current"])
-    return ended({"current": payload["current"], **by_criteria}, measured.life.end)
+    return ended(criteria_answer(measured, ends, prediction)[0], measured.life.end)
 
 
 def measured_life(
@@ -122,7 +123,7 @@ def measured_life(
     )
 
 
-def engagement_rows(events: Sequence[Event], engagements: Mapping[str, StoredEngagement]) -> list[dict[str, Any]]:
+def engagement_rows(events: Sequence[Event], engagements: Mapping[str, StoredEngagement]) -> list[MeasuredEngagement]:
     """The engagements of a history with all indicators, by life and cycles."""
     names = [[event.run_id for event in life.events] for life in lives_of(events)]
     stored = [engagements[event.run_id] for event in events if event.run_id in engagements]

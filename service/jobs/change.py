@@ -4,10 +4,9 @@ import importlib
 import json
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import closing
 from dataclasses import dataclass
-from typing import Any
 
 from service.jobs import process
 from service.jobs.executor import Executor, InProcess
@@ -50,7 +49,7 @@ def main() -> None:
         sys.exit(AWAY)
 
 
-def done(database: Database, task: ChangeTask, say: Callable[[Json], None], executor: Executor) -> dict[str, Any]:
+def done(database: Database, task: ChangeTask, say: Callable[[Json], None], executor: Executor) -> Mapping[str, object]:
     """The result, in numbers and with the reasons why clutches were left, and the progress that was said last."""
     module, _, name = task.function.partition(":")
     function = getattr(importlib.import_module(module), name)

@@ -5,7 +5,7 @@ import json
 import os
 import resource
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import closing
 from dataclasses import dataclass, replace
 from typing import Any
@@ -61,7 +61,7 @@ def main() -> None:
     process.answer(ended)
 
 
-def diagnosed(task: DiagnosisTask, say: Callable[[Json], None] = lambda _: None) -> dict[str, Any]:
+def diagnosed(task: DiagnosisTask, say: Callable[[Json], None] = lambda _: None) -> Mapping[str, Any]:
     """The report in the public shape, and the extension. The same runs give the same, whatever their clutch is called."""
     module, _, function = task.engine.partition(":")
     diagnose = getattr(importlib.import_module(module), function)
@@ -117,7 +117,7 @@ def read_life(
 
 def before_and_after(
     database: Database, clutch_id: str, diagnosed_life: DiagnosedLife, extension: Extension | None
-) -> tuple[dict[str, Any], dict[str, Any]]:
+) -> tuple[Mapping[str, Any], Mapping[str, Any]]:
     """The particle filter's prediction of the life that was diagnosed, by both models; alike where there is no extension."""
     if diagnosed_life.life is None:
         return {}, {}
@@ -127,8 +127,9 @@ def before_and_after(
         cofs = {run_id: by_key[key] for run_id, key in runs.keys(connection, clutch_id).items() if key in by_key}
     plain = diagnosed_life.life.with_cofs(cofs)
 
-    def prediction(life: Life, model: Extension | None) -> dict[str, Any]:
-        return predict_at(life.events, state.assumptions_under(model, life), state.fraction, method=_METHOD)
+    def prediction(life: Life, model: Extension | None) -> Mapping[str, Any]:
+        assumptions = state.assumptions_under(model, life)
+        return repository.json_of(predict_at(life.events, assumptions, state.fraction, method=_METHOD))
 
     before = prediction(plain, None)
     if extension is None:

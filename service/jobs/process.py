@@ -76,7 +76,7 @@ class Child:
         steps = [line for line in self._lines() if line.startswith(PROGRESS)]
         return json.loads(steps[-1].removeprefix(PROGRESS)) if steps else None
 
-    def written(self, name: str) -> dict[str, Any]:
+    def written(self, name: str) -> Mapping[str, Any]:
         """What the process, which has ended, wrote as its answer; what it complained of is logged under the job's `name`.
 
         Raises FailedError; AwayError where the database did not answer, so that the job can be done again.

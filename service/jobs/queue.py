@@ -220,7 +220,7 @@ class JobQueue:
         with self._database.writing(of=self._name) as connection:
             jobs.end(connection, job.job_id, jobs.FAILED, _now(), problem=UNSTORED, claimer=job.claimed_by)
 
-    def _outcome(self, job: JobRow, kind: JobKind) -> dict[str, Any] | None:
+    def _outcome(self, job: JobRow, kind: JobKind) -> Mapping[str, Any] | None:
         """What its process wrote, or a problem; None where it is not to be ended now: by another service, or later."""
         if job.attempts > MAX_ATTEMPTS:
             return {"problem": GIVEN_UP}

@@ -11,7 +11,7 @@ from pathlib import PurePath
 from typing import Any
 
 from service.api.base import MAX_CYCLES
-from service.api.rig import RigProfile
+from service.api.rig import FileKindName, RigProfile
 from service.errors import InvalidError
 from service.readers.unit_table import conversion, spellings
 
@@ -31,7 +31,7 @@ _NUMBER = re.compile(r"\d+(?:[.,' ]\d{3})*")
 class Named:
     """What a file says of its run besides the table; None where it says nothing."""
 
-    kind: str | None = None
+    kind: FileKindName | None = None
     cycles: float | None = None
     run_id: str | None = None
 

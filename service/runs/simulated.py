@@ -26,12 +26,12 @@ _MICROMETRES_PER_METRE = 1e6
 _POWERS = np.array([float(f"1e{exponent}") for exponent in range(23)])
 
 
-def simulated_clutch_body(clutch_id: str) -> dict[str, Any]:
+def simulated_clutch_body(clutch_id: str) -> dict[str, object]:
     """The record of a simulated clutch: the reference's geometry and oil, origin simulated."""
     return {"clutch_id": clutch_id, "origin": "simulated"}
 
 
-def simulated_head(run: SimulatedRun) -> dict[str, Any]:
+def simulated_head(run: SimulatedRun) -> dict[str, object]:
     """The fields of a simulated run beside its channels: name, kind, cycles, origin."""
     return {"run_id": run.run_id, "kind": run.kind.value, "cycles": run.cycles, "origin": "simulated"}
 
@@ -44,7 +44,7 @@ def simulated_channels(run: SimulatedRun) -> dict[str, FloatArray]:
     return {name: _from_si(name, column) for name, column in _columns(data).items() if column is not None}
 
 
-def simulated_body(run: SimulatedRun) -> dict[str, Any]:
+def simulated_body(run: SimulatedRun) -> dict[str, object]:
     """The JSON body of a simulated run."""
     body = simulated_head(run)
     channels = simulated_channels(run)
@@ -55,7 +55,7 @@ def simulated_body(run: SimulatedRun) -> dict[str, Any]:
     return body
 
 
-def simulated_inspection(surface: Surface, cycles: float) -> dict[str, Any]:
+def simulated_inspection(surface: Surface, cycles: float) -> dict[str, object]:
     """The JSON body of an inspection of a simulated clutch after so many cycles, to three digits as a profilometer's."""
     roughness = float(f"{surface.roughness * _MICROMETRES_PER_METRE:.3g}")
     return {

@@ -8,6 +8,7 @@ from pathlib import Path
 from models.arrays import FloatArray
 from models.records.cleaning import UnusableRecordError
 from models.records.plateaus import cut_plateaus
+from service.api.base import Origin
 from service.api.rig import RigProfile
 from service.channels import PLATE_TEMPERATURES, check_columns
 from service.clutch.incoming_run import IncomingRun, SampledChannels, name_run
@@ -36,7 +37,7 @@ def read_file_run(
     cycles: float | None,
     run_id: str | None = None,
     started_at: datetime | None = None,
-    origin: str = "measured",
+    origin: Origin = "measured",
     reading: Reading | None = None,
     profile: RigProfile | None = None,
     rig: str | None = None,

@@ -123,13 +123,13 @@ def _each_clutch(database: Database) -> Iterator[Metric]:
     text = "Duty cycles until end of life"
     remaining = GaugeMetricFamily("clutchlife_clutch_remaining_cycles", text, labels=["clutch", "quantile"])
     for item in clutch_list.every(database, at_once=METRICS_PAGE):
-        name, summary = item["clutch_id"], item["summary"]
-        counts.add_metric([name], item["runs"])
+        name, summary = item.clutch_id, item.summary
+        counts.add_metric([name], item.runs)
         if summary is None:
             continue
-        if summary["current"]["health"] is not None:
-            health.add_metric([name], summary["current"]["health"])
-        for quantile, cycles in summary["remaining_cycles"].items():
+        if summary.current.health is not None:
+            health.add_metric([name], summary.current.health)
+        for quantile, cycles in summary.remaining_cycles.items():
             if cycles is not None:
                 remaining.add_metric([name, quantile], cycles)
     yield from (counts, health, remaining)

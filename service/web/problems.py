@@ -3,7 +3,8 @@
 import errno
 import http
 import logging
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, TypeAlias
 
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
@@ -11,7 +12,7 @@ from fastapi.responses import Response
 from starlette.exceptions import HTTPException
 
 from service.answers.cache import to_json
-from service.api.base import Problem, rule_in_words
+from service.api.base import Problem, ProblemError, rule_in_words
 from service.errors import (
     ConflictError,
     DamagedError,
@@ -44,15 +45,15 @@ _log = logging.getLogger("clutchlife")
 def problem(
     status: int, slug: str, title: str, detail: str, errors: tuple[FieldError, ...] = (), total: int = 0
 ) -> Response:
-    body: dict[str, Any] = {
-        "type": f"urn:clutchlife:problem:{slug}",
-        "title": title,
-        "status": status,
-        "detail": detail,
-        "errors": [_shown(error) for error in errors],
-        "total_errors": total,
-        "request_id": request_id.get(),
-    }
+    body = Problem(
+        type=f"urn:clutchlife:problem:{slug}",
+        title=title,
+        status=status,
+        detail=detail,
+        errors=[_shown(error) for error in errors],
+        total_errors=total,
+        request_id=request_id.get(),
+    )
     headers = {"Cache-Control": "no-store"}
     if status in (http.HTTPStatus.SERVICE_UNAVAILABLE, http.HTTPStatus.TOO_MANY_REQUESTS):
         headers["Retry-After"] = str(RETRY_AFTER_SECONDS)
@@ -67,14 +68,14 @@ def refused(kind: type[ServiceError], detail: str) -> Response:
     return problem(kind.status, kind.slug, kind.title, detail)
 
 
-def _shown(error: FieldError) -> dict[str, Any]:
-    return {
-        "pointer": error.pointer,
-        "row": error.row,
-        "value": _printable(error.value),
-        "code": error.code,
-        "message": _printable(error.message),
-    }
+def _shown(error: FieldError) -> ProblemError:
+    return ProblemError(
+        pointer=error.pointer,
+        row=error.row,
+        value=_printable(error.value),
+        code=error.code,
+        message=_printable(error.message),
+    )
 
 
 def _printable(text: str) -> str:
@@ -115,7 +116,7 @@ def _request_error(request: Request, error: RequestValidationError) -> Response:
     return _service_error(request, InvalidError(errors[0].message + more, errors=errors))
 
 
-def _argument_error(details: dict[str, Any]) -> FieldError:
+def _argument_error(details: Mapping[str, Any]) -> FieldError:
     name = ".".join(str(part) for part in details["loc"][1:])
     shown = repr(details.get("input"))[:80]
     return FieldError(
@@ -150,15 +151,19 @@ def unexpected(request: Request, error: Exception) -> Response:
     return refused(ServiceError, "the service's log describes this error")
 
 
-#: For the API's description: which problems an address may answer with.
-def described(*kinds: type[ServiceError]) -> dict[int | str, dict[str, Any]]:
+#: The answers of a route by their status, as FastAPI takes them for the API's description.
+Described: TypeAlias = dict[int | str, dict[str, Any]]
+
+
+def described(*kinds: type[ServiceError]) -> Described:
     """OpenAPI responses for these problems and for those that every address has."""
     always: list[type[ServiceError]] = [UnauthorizedError, ForbiddenError, InvalidError, TooManyError]
-    answers: dict[int | str, dict[str, Any]] = {kind.status: _described(kind.title) for kind in [*always, *kinds]}
-    return answers | {503: _described("Busy, or the database cannot be used; try again after Retry-After")}
+    answers: Described = {kind.status: _described(kind.title) for kind in [*always, *kinds]}
+    answers[503] = _described("Busy, or the database cannot be used; try again after Retry-After")
+    return answers
 
 
-def _described(title: str) -> dict[str, Any]:
+def _described(title: str) -> dict[str, object]:
     return {"description": title, "content": {PROBLEM_TYPE: {"schema": Problem.model_json_schema()}}}
 
 

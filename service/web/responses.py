@@ -15,7 +15,7 @@ from concurrent.futures import Future
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import partial
-from typing import Annotated, Any, ParamSpec, TypeVar
+from typing import Annotated, Any, Generic, ParamSpec, TypedDict, TypeVar
 
 from fastapi import Depends, Request
 from fastapi.concurrency import run_in_threadpool
@@ -23,44 +23,50 @@ from fastapi.responses import Response
 from pydantic import BaseModel
 from starlette.requests import ClientDisconnect
 
-from service.answers.cache import CachedAnswer, Made, Page, name_of, revision_and_json, shared_answer, to_json
+from service.answers.cache import CachedAnswer, CsvPage, Made, name_of, revision_and_json, shared_answer, to_json
 from service.api.parameters import ClutchId
 from service.errors import UnsupportedMediaTypeError, unknown_clutch
 from service.jobs.workers import CHANGE_SECONDS, Lane
 from service.paging import ALL_ITEMS, WHOLE, Part, from_cursor
+from service.tables import Cells
 from service.web.auth import Admin, Reader, grant_of, snapshot_of
 from service.web.bodies import parsed
 from service.web.context import Context, Cursor, Limit, Whole
 from service.web.limits import LONGEST_WAIT_SECONDS, USUAL_ITEMS, WAIT_SECONDS
 from service.web.middleware import Again, remember
-from service.web.problems import CHANGING
+from service.web.problems import CHANGING, Described
 from storage import clutches
 from storage.encoding import to_text
 from storage.engine.database import Database
 
 Given = ParamSpec("Given")
 Body = TypeVar("Body", bound=BaseModel)
-Rows = Iterable[Mapping[str, Any]]
+AnswerType = TypeVar("AnswerType", bound=BaseModel)
 #: What computes an answer of a database, a clutch's name and further arguments.
-Query = Callable[..., dict[str, Any]]
+Query = Callable[..., AnswerType]
 #: How a text begins that spreadsheets take for a formula. Source: https://owasp.org/www-community/attacks/CSV_Injection.
 _FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n")
 
 
 @dataclass(frozen=True, slots=True)
-class ExportedTable:
-    """A table that is exported: the `rows` of an answer, and their columns where there are none."""
+class ExportedTable(Generic[AnswerType]):
+    """A table that is exported: the `rows` of an answer of a type, and their columns where there are none."""
 
-    rows: Callable[[Mapping[str, Any]], Rows]
+    answer: type[AnswerType]
+    rows: Callable[[AnswerType], Iterable[Cells]]
     columns: Sequence[str]
 
-    def page(self, answer: Mapping[str, Any], part: Part = WHOLE) -> Page:
+    def page(self, answer: AnswerType, part: Part = WHOLE) -> CsvPage:
         """The part of an answer's rows that was asked for; the table goes on where the part or the answer does."""
         page = part.sliced(list(self.rows(answer)))
-        return Page(encode_table(self.columns, page["items"]), page["next"] or answer.get("next"))
+        return CsvPage(encode_table(self.columns, page.items), page.next or getattr(answer, "next", None))
+
+    def page_of_json(self, body: bytes, part: Part) -> CsvPage:
+        """The same of an answer's JSON."""
+        return self.page(self.answer.model_validate_json(body), part)
 
 
-def encode_table(columns: Sequence[str], rows: Sequence[Mapping[str, Any]]) -> bytes:
+def encode_table(columns: Sequence[str], rows: Sequence[Cells]) -> bytes:
     """CSV after RFC 4180 in UTF-8, a header row first; null is an empty field.
 
     A first row with other names than `columns` gives the columns. Text that a spreadsheet would take for a formula has an
@@ -90,14 +96,14 @@ def now() -> str:
 
 
 async def answer(
-    request: Request, query: Callable[Given, object], *given: Given.args, **more: Given.kwargs
+    request: Request, query: Callable[Given, BaseModel], *given: Given.args, **more: Given.kwargs
 ) -> Response:
     """A GET's answer that is made again each time; its ETag is that of the bytes: it changes when and only when they do."""
     return tagged(request, CachedAnswer.of(await run_in_threadpool(lambda: to_json(query(*given, **more)))), JSON_TYPE)
 
 
 async def cached_answer(
-    context: Context, key: Hashable, version: Hashable, make: Callable[[], bytes | Page]
+    context: Context, key: Hashable, version: Hashable, make: Callable[[], bytes | CsvPage]
 ) -> CachedAnswer:
     """What the cache has for `key` at `version`; where it has nothing yet, `make` is called in a thread."""
     answer = context.cache.held(key, version)
@@ -170,7 +176,7 @@ async def clutch_bytes(of: OfClutch, query: Callable[[Database, str], bytes]) ->
     return (await cached_answer(of.context, key, _revision(of), lambda: query(of.database, of.clutch_id))).body
 
 
-async def clutch_answer(of: OfClutch, query: Callable[..., dict[str, Any] | bytes], *arguments: Hashable) -> Response:
+async def clutch_answer(of: OfClutch, query: Callable[..., BaseModel | bytes], *arguments: Hashable) -> Response:
     """A GET's answer that follows from a clutch's revision: `query(database, clutch_id, *arguments)`, whose bytes are JSON.
 
     Where it was made for this revision already, nothing is read. Raises NotFoundError.
@@ -188,7 +194,9 @@ async def clutch_answer(of: OfClutch, query: Callable[..., dict[str, Any] | byte
     return tagged(of.request, answer, JSON_TYPE, revision)
 
 
-async def clutch_table(of: OfClutch, query: Query, table: ExportedTable, *arguments: Hashable) -> Response:
+async def clutch_table(
+    of: OfClutch, query: Query[AnswerType], table: ExportedTable[AnswerType], *arguments: Hashable
+) -> Response:
     """The CSV export of a page that follows from a clutch's revision. Raises NotFoundError."""
     revision = _revision(of)
     key = (of.clutch_id, f"{name_of(query)}.csv", *arguments)
@@ -199,7 +207,7 @@ async def clutch_table(of: OfClutch, query: Query, table: ExportedTable, *argume
 
 
 async def computed_answer(
-    of: OfClutch, query: Query, *arguments: Hashable, prefer: str | None = None, lane: Lane = Lane.ANSWERS
+    of: OfClutch, query: Query[BaseModel], *arguments: Hashable, prefer: str | None = None, lane: Lane = Lane.ANSWERS
 ) -> Response:
     """A GET's answer that takes long: `query(database, clutch_id, *arguments)`, computed by a worker of that lane; a page of
     its items where one was asked for. `prefer` is what the sender prefers. Raises NotFoundError."""
@@ -209,27 +217,32 @@ async def computed_answer(
         return tagged(of.request, answer, JSON_TYPE, revision)
 
     def page_of_cached() -> bytes:
-        payload = json.loads(answer.body)
-        return to_json(payload | of.part.sliced(payload["items"]))
+        whole = json.loads(answer.body)
+        return to_text(whole | of.part.sliced(whole["items"])._asdict()).encode()
 
     key = (of.clutch_id, f"{name_of(query)}.page", *arguments, of.part)
     return tagged(of.request, await cached_answer(of.context, key, revision, page_of_cached), JSON_TYPE, revision)
 
 
 async def computed_table(
-    of: OfClutch, query: Query, table: ExportedTable, *arguments: Hashable, prefer: str | None = None
+    of: OfClutch,
+    query: Query[AnswerType],
+    table: ExportedTable[AnswerType],
+    *arguments: Hashable,
+    prefer: str | None = None,
 ) -> Response:
     """The CSV export of the same: a page of the rows of its JSON, which goes on where that does. Raises NotFoundError."""
     revision, answer = await _computed(of, _revision(of), query, arguments, prefer)
     key = (of.clutch_id, f"{name_of(query)}.csv", *arguments, of.part)
-    page = await cached_answer(of.context, key, revision, lambda: table.page(json.loads(answer.body), of.part))
+    page = await cached_answer(of.context, key, revision, lambda: table.page_of_json(answer.body, of.part))
     return tagged(of.request, page, CSV_TYPE, revision)
 
 
 async def computed_of_each(
-    request: Request, context: Context, query: Query, *arguments: Hashable
-) -> list[dict[str, Any]]:
-    """The newest answers of a query about each clutch, one after the other: the same that are given for the clutch alone.
+    request: Request, context: Context, answered: type[AnswerType], query: Query[AnswerType], *arguments: Hashable
+) -> list[AnswerType]:
+    """The newest answers of a type that a query gives about each clutch, one after the other: the same that are given for
+    the clutch alone.
 
     Raises ClientDisconnect where nobody waits for them any more.
     """
@@ -244,14 +257,14 @@ async def computed_of_each(
             raise ClientDisconnect
         of = OfClutch(request=request, context=context, clutch_id=clutch_id)
         _, answer = await _computed(of, revision, query, arguments, f"wait={LONGEST_WAIT_SECONDS}")
-        items.append(await run_in_threadpool(json.loads, answer.body))
+        items.append(await run_in_threadpool(answered.model_validate_json, answer.body))
     return items
 
 
 async def _computed(
     of: OfClutch,
     revision: int,
-    query: Query,
+    query: Query[BaseModel],
     arguments: tuple[Hashable, ...],
     prefer: str | None,
     lane: Lane = Lane.ANSWERS,
@@ -273,7 +286,7 @@ async def _computed(
     return await context.revalidation.answer(key, revision, compute, wait=wait)
 
 
-async def begin_computed(context: Context, clutch_id: str, query: Query) -> None:
+async def begin_computed(context: Context, clutch_id: str, query: Query[BaseModel]) -> None:
     """Hold the answer of a clutch that has just been registered, so that the one after its first run is not waited for."""
     revision, body = await run_in_threadpool(revision_and_json, context.database, query, clutch_id, ())
     context.revalidation.begin((clutch_id, name_of(query)), revision, body)
@@ -304,7 +317,7 @@ def _revision(of: OfClutch) -> int:
     return revision
 
 
-async def table(request: Request, make: Callable[[], Page]) -> Response:
+async def table(request: Request, make: Callable[[], CsvPage]) -> Response:
     """A GET's answer as CSV that is made again each time, a page of it."""
     return tagged(request, CachedAnswer.of(await run_in_threadpool(make)), CSV_TYPE)
 
@@ -325,9 +338,9 @@ def _following(request: Request, cursor: str) -> str:
     return f"{url.path}?{url.query}"
 
 
-def json_answer(content: object, status: int = 200, **headers: str) -> Response:
+def json_answer(content: BaseModel, status: int = 200, **headers: str) -> Response:
     """An answer to a change, or to a question that is asked once: JSON without a tag."""
-    return Response(content=to_text(content), status_code=status, media_type=JSON_TYPE, headers=headers)
+    return Response(content=to_json(content), status_code=status, media_type=JSON_TYPE, headers=headers)
 
 
 def unchanged(request: Request, headers: Mapping[str, str]) -> Response | None:
@@ -354,23 +367,33 @@ def require_json(request: Request) -> None:
         raise UnsupportedMediaTypeError(f"send the body as application/json, not as {kind[:80]!r}")
 
 
+class TakingRoute(TypedDict):
+    """What FastAPI is told of a route that takes a body."""
+
+    response_model: type[BaseModel]
+    responses: Described
+    openapi_extra: dict[str, object]
+
+
 def taking(
-    body: type[BaseModel] | dict[str, Any],
+    body: type[BaseModel] | Mapping[str, object],
     answered: type[BaseModel],
-    example: dict[str, Any],
-    responses: Mapping[int | str, dict[str, Any]] = CHANGING,
+    example: Mapping[str, object],
+    responses: Described = CHANGING,
     also: Mapping[int, str] | None = None,
     *,
     required: bool = True,
-) -> dict[str, Any]:
+) -> TakingRoute:
     """How a route that takes a body is described, since it reads that itself: the body with an example, its answer, and what
     other statuses `also` mean that come with the same answer."""
-    described = body if isinstance(body, dict) else body.model_json_schema()
+    described = body.model_json_schema() if isinstance(body, type) else body
     content = {"application/json": {"schema": described, "example": example}}
-    other_responses = {status: {"model": answered, "description": meaning} for status, meaning in (also or {}).items()}
+    other_responses: Described = {
+        status: {"model": answered, "description": meaning} for status, meaning in (also or {}).items()
+    }
     return {
         "response_model": answered,
-        "responses": dict(responses) | other_responses,
+        "responses": {**responses, **other_responses},
         "openapi_extra": {"requestBody": {"required": required, "content": content}},
     }
 

@@ -10,8 +10,10 @@ from typing import Any, Literal
 
 import pytest
 from fastapi.testclient import TestClient
+from pydantic import BaseModel
 from typer.testing import CliRunner
 
+from service.answers.cache import to_json
 from service.app import create_app
 from service.cli.main import app as command_line
 from service.settings import Settings
@@ -52,6 +54,11 @@ def post_run(client: TestClient, run: dict[str, Any], clutch_id: str = "c1") -> 
     answer = client.post(f"/v1/clutches/{clutch_id}/runs", json=run)
     assert answer.status_code == 201, answer.text
     return answer.json()
+
+
+def as_answered(answer: BaseModel) -> Any:
+    """An answer as a client reads it."""
+    return json.loads(to_json(answer))
 
 
 def csv_text(channels: dict[str, list[float]]) -> str:

@@ -10,7 +10,14 @@ from models.arrays import FloatArray
 from models.prognosis.criteria import FEWEST_TESTS, QUANTILES
 from models.prognosis.first_passage import Limit, PassageStatus, first_reached, horizon_at, places, weighted_quantiles
 from models.prognosis.first_passage import paths as track_paths
-from service.api.life import CriterionIn
+from service.api.life import (
+    Criterion,
+    CriterionIn,
+    CriterionOutcome,
+    CriterionValue,
+    LifePrediction,
+    Quantiles,
+)
 from service.channels import PASCALS_PER_BAR
 from service.clutch.assumptions import ALL_PRESSURES, MEAN_COF
 from service.clutch.items import INSUFFICIENT, SAFE, by_quantile, safe_bound, share_of_way
@@ -135,15 +142,22 @@ _DRAWS = 2_000
 GIVEN = ("quantity", "pressure_bar", "speed_rpm", "frequency_hz", "fraction", "below", "above")
 
 
-def criteria_answer(measured: MeasuredLife, ends: Sequence[CriterionEnd], current: Mapping[str, Any]) -> dict[str, Any]:
-    """When the first of several limits is reached, what is known of each, and `current` with the least health by any."""
+def criteria_answer(
+    measured: MeasuredLife, ends: Sequence[CriterionEnd], prediction: LifePrediction
+) -> tuple[LifePrediction, list[CriterionOutcome]]:
+    """A prediction by mean COF as it is by several limits, of which the first that is reached ends the life: its present
+    health is the least by any; and what is known of each."""
     now = measured.life.events[-1].cycles
     samples = [end.ends for end in ends if end.ends is not None]
     if not samples:
-        nothing = {"status": INSUFFICIENT, "probability_of_reaching": None, "at_least": None}
-        items = [_item(end, now, 0.0) for end in ends]
-        answer = {"current": {**current, "health": None}, "criterion": _criterion(ends[0]), "criteria": items}
-        return _quantiles(None, now) | nothing | answer
+        nothing = _quantiles(None, now) | {
+            "status": INSUFFICIENT,
+            "probability_of_reaching": None,
+            "at_least": None,
+            "current": prediction.current.model_copy(update={"health": None}),
+            "criterion": _criterion(ends[0]),
+        }
+        return prediction.model_copy(update=nothing), [_item(end, now, 0.0) for end in ends]
     shares: FloatArray = np.ones(1)
     first: Sample = samples[0]
     if len(samples) > 1:
@@ -152,19 +166,19 @@ def criteria_answer(measured: MeasuredLife, ends: Sequence[CriterionEnd], curren
         first = draws, np.full(draws.size, 1.0 / draws.size)
     by_known = iter(shares.tolist())
     items = [_item(end, now, next(by_known) if end.ends is not None else 0.0) for end in ends]
-    leading = max(range(len(items)), key=lambda index: items[index]["probability_first"])
+    leading = max(range(len(items)), key=lambda index: items[index].probability_first)
     stated = _quantiles(first, now)
     passed = float(first[1][first[0] <= now].sum())
     ahead = PassageStatus.MAY_NEVER_REACH if None in stated["end_of_life_cycles"].values() else PassageStatus.PREDICTED
     health = [share for end in ends if (share := _health(end)) is not None]
-    return stated | {
+    known = stated | {
         "status": (PassageStatus.REACHED if passed >= 0.5 else ahead).value,
         "at_least": safe_bound(stated["end_of_life_cycles"][f"{SAFE:g}"], now, measured.life.origin),
         "probability_of_reaching": _probability_of_reaching(first),
-        "current": {**current, "health": min(health, default=None)},
+        "current": prediction.current.model_copy(update={"health": min(health, default=None)}),
         "criterion": _criterion(ends[leading]),
-        "criteria": items,
     }
+    return prediction.model_copy(update=known), items
 
 
 def _probability_of_reaching(sample: Sample) -> float:
@@ -179,7 +193,7 @@ def _health(end: CriterionEnd) -> float | None:
     return share_of_way(end.current[0], end.initial, limit, rises=end.criterion.above is not None)
 
 
-def _quantiles(sample: Sample | None, now: float) -> dict[str, dict[str, float | None]]:
+def _quantiles(sample: Sample | None, now: float) -> dict[str, Quantiles]:
     """Quantiles of the end and of what remains from `now` cycles; null beyond the horizon."""
     if sample is None:
         return {"end_of_life_cycles": by_quantile({}), "remaining_cycles": by_quantile({})}
@@ -191,17 +205,24 @@ def _quantiles(sample: Sample | None, now: float) -> dict[str, dict[str, float |
     return {"end_of_life_cycles": by_quantile(by_level), "remaining_cycles": by_quantile(left)}
 
 
-def _item(end: CriterionEnd, now: float, first: float) -> dict[str, Any]:
+def _item(end: CriterionEnd, now: float, first: float) -> CriterionOutcome:
     """One criterion, with its own end, and how probably it is the first."""
     value, sd = end.current or (None, None)
-    reaching = None if end.ends is None else _probability_of_reaching(end.ends)
-    fields = {"current": {"value": value, "sd": sd}, "probability_of_reaching": reaching, "probability_first": first}
-    return _criterion_item(end) | _quantiles(end.ends, now) | fields | {"tests": end.tests}
+    quantiles = _quantiles(end.ends, now)
+    return CriterionOutcome(
+        **_place(end),
+        end_of_life_cycles=quantiles["end_of_life_cycles"],
+        remaining_cycles=quantiles["remaining_cycles"],
+        probability_of_reaching=None if end.ends is None else _probability_of_reaching(end.ends),
+        current=CriterionValue(value=value, sd=sd),
+        probability_first=first,
+        tests=end.tests,
+    )
 
 
-def _criterion_item(end: CriterionEnd) -> dict[str, Any]:
-    fields = {name: getattr(end.criterion, name) for name in GIVEN}
-    return fields | {"initial": end.initial, "limit": _limit(end)}
+def _place(end: CriterionEnd) -> Mapping[str, Any]:
+    """A criterion as the record has it, with its quantity when new and its limit."""
+    return {name: getattr(end.criterion, name) for name in GIVEN} | {"initial": end.initial, "limit": _limit(end)}
 
 
 def _limit(end: CriterionEnd) -> float | None:
@@ -212,11 +233,11 @@ def _limit(end: CriterionEnd) -> float | None:
     return float(limit.level(end.initial or 0.0))
 
 
-def _criterion(end: CriterionEnd) -> dict[str, Any]:
+def _criterion(end: CriterionEnd) -> Criterion:
     """The leading criterion as the answer's own; mean COF's numbers only where it is mean COF."""
     of_cof = end.criterion.quantity == MEAN_COF
-    fields = _criterion_item(end)
-    return fields | {
-        "initial_mean_cof": end.initial if of_cof else None,
-        "threshold_mean_cof": fields["limit"] if of_cof else None,
-    }
+    return Criterion(
+        **_place(end),
+        initial_mean_cof=end.initial if of_cof else None,
+        threshold_mean_cof=_limit(end) if of_cof else None,
+    )

@@ -1,7 +1,8 @@
 """A quantity at one place as `/degradation` shows it: what was measured, its course, and the coefficients of eq. 6."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
@@ -11,16 +12,26 @@ from models.prognosis.first_passage import weighted_quantiles
 from models.tracking.courses import CourseForm
 from models.tracking.posterior import TrackPosterior
 from models.tracking.sampling import thinned
+from service.api.over_life import CoefficientDraws, Coefficients, DegradationItem, Estimate, Measured, Trajectory
 from service.channels import whole
 from service.clutch.quantities.measured import Quantity, place_of
 from service.clutch.timeline import Series
 
+Own = TypeVar("Own")
 #: The coefficients of eq. 6 by their public names.
 COEFFICIENTS = ("initial", "change", "scale_cycles", "exponent")
-#: What an item says of eq. 6.
-_OF_EQ_6 = ("coefficients", "correlations", "eq6_probability", "draws")
 #: Points of a trajectory, and how far past the last test it goes.
 _POINTS, _AHEAD = 40, 1.5
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _OfEq6:
+    """What an item says of eq. 6; nothing where the quantity has no track of its own."""
+
+    coefficients: Coefficients | None = None
+    correlations: list[list[float]] | None = None
+    eq6_probability: float | None = None
+    draws: CoefficientDraws | None = None
 
 
 def trajectory_cycles(series: Series, until: float | None) -> FloatArray:
@@ -32,7 +43,7 @@ def trajectory_cycles(series: Series, until: float | None) -> FloatArray:
 
 def track_item(
     quantity: Quantity, series: Series, posterior: TrackPosterior, draws: int = 0, until: float | None = None
-) -> dict[str, Any]:
+) -> DegradationItem:
     """A quantity that has a track of its own; the course of the model in force is put back on. `draws` > 0: with so many
     joint draws of the coefficients. With too few tests there is only what was measured."""
     if len({measurement.progress for measurement in series.measurements}) < FEWEST_TESTS:
@@ -43,45 +54,49 @@ def track_item(
     band = np.array([weighted_quantiles(row, posterior.weight, BAND) for row in values])
     home = np.flatnonzero(posterior.course == CourseForm.EQ_6)
     share = float(posterior.weight[home].sum())
-    coefficients: dict[str, Any] = dict.fromkeys(_OF_EQ_6) | {"eq6_probability": share}
-    if share > 0.0:
-        following = posterior.taken(home, posterior.weight[home] / share)
-        coefficients["coefficients"] = _coefficients(following)
-        coefficients["correlations"] = _correlations(following)
-        if draws:  # of equal weight, a row of the columns a draw
-            samples = _samples(thinned(following, draws, 0.5))
-            coefficients["draws"] = {name: own.tolist() for name, own in zip(COEFFICIENTS, samples, strict=True)}
-    return _item(quantity, series, coefficients, cycles, band)
+    if share == 0.0:
+        return _item(quantity, series, _OfEq6(eq6_probability=share), cycles, band)
+    following = posterior.taken(home, posterior.weight[home] / share)
+    samples = _samples(thinned(following, draws, 0.5)) if draws else ()  # of equal weight, a row of the columns a draw
+    of_eq_6 = _OfEq6(
+        coefficients=_coefficients(following),
+        correlations=_correlations(following),
+        eq6_probability=share,
+        draws=CoefficientDraws(**_named(sample.tolist() for sample in samples)) if draws else None,
+    )
+    return _item(quantity, series, of_eq_6, cycles, band)
 
 
 def paths_item(
     quantity: Quantity, series: Series, paths: FloatArray | None, until: float | None = None
-) -> dict[str, Any]:
+) -> DegradationItem:
     """A quantity that follows from others' tracks, whose `paths` [k, n] over `trajectory_cycles` are equal draws (None: too
     few tests): it has no coefficients of its own."""
     band = np.zeros((0, len(BAND))) if paths is None else np.quantile(paths, BAND, axis=1).T
     cycles = trajectory_cycles(series, until)[: band.shape[0]]
-    return _item(quantity, series, dict.fromkeys(_OF_EQ_6), cycles, band)
+    return _item(quantity, series, _OfEq6(), cycles, band)
 
 
-def _item(
-    quantity: Quantity, series: Series, coefficients: Mapping[str, Any], cycles: FloatArray, band: FloatArray
-) -> dict[str, Any]:
+def _item(quantity: Quantity, series: Series, of_eq_6: _OfEq6, cycles: FloatArray, band: FloatArray) -> DegradationItem:
     tested = series.scale.cycles(np.array([measurement.progress for measurement in series.measurements]))
     off = series.assumptions.offset(series.quantity, series.pressure, tested)
     measured = zip(series.measurements, off.tolist(), strict=True)
     lower, median, upper = band.T.tolist()
-    head = {"quantity": quantity.name, "unit": quantity.unit} | place_of(series)
-    return {
-        **head,
-        **coefficients,
-        "measured": {
-            "cycles": [whole(count) for count in tested.tolist()],
-            "value": [measurement.value + added for measurement, added in measured],
-            "sd": [measurement.variance**0.5 for measurement in series.measurements],
-        },
-        "trajectory": {"cycles": cycles.tolist(), "lower": lower, "median": median, "upper": upper},
-    }
+    return DegradationItem(
+        quantity=quantity.name,
+        unit=quantity.unit,
+        **place_of(series),
+        coefficients=of_eq_6.coefficients,
+        correlations=of_eq_6.correlations,
+        eq6_probability=of_eq_6.eq6_probability,
+        draws=of_eq_6.draws,
+        measured=Measured(
+            cycles=[whole(count) for count in tested.tolist()],
+            value=[measurement.value + added for measurement, added in measured],
+            sd=[measurement.variance**0.5 for measurement in series.measurements],
+        ),
+        trajectory=Trajectory(cycles=cycles.tolist(), lower=lower, median=median, upper=upper),
+    )
 
 
 def _samples(draws: TrackPosterior) -> Sequence[FloatArray]:
@@ -89,15 +104,21 @@ def _samples(draws: TrackPosterior) -> Sequence[FloatArray]:
     return draws.initial, draws.change, draws.scale, draws.exponent
 
 
-def _coefficients(draws: TrackPosterior) -> dict[str, dict[str, Any]]:
-    """Mean, deviation and quantiles of each coefficient."""
-    coefficients = {}
-    for name, sample in zip(COEFFICIENTS, _samples(draws), strict=True):
-        value, sd = draws.moments(sample)
-        quantiles = weighted_quantiles(sample, draws.weight, QUANTILES).tolist()
-        by_level = {f"{level:g}": number for level, number in zip(QUANTILES, quantiles, strict=True)}
-        coefficients[name] = {"value": value, "sd": sd, "quantiles": by_level}
-    return coefficients
+def _named(each: Iterable[Own]) -> dict[str, Own]:
+    """What is given for each coefficient by its name."""
+    return dict(zip(COEFFICIENTS, each, strict=True))
+
+
+def _coefficients(draws: TrackPosterior) -> Coefficients:
+    return Coefficients(**_named(_estimate(draws, sample) for sample in _samples(draws)))
+
+
+def _estimate(draws: TrackPosterior, sample: FloatArray) -> Estimate:
+    """Mean, deviation and quantiles of a coefficient [n]."""
+    value, sd = draws.moments(sample)
+    quantiles = weighted_quantiles(sample, draws.weight, QUANTILES).tolist()
+    by_level = {f"{level:g}": number for level, number in zip(QUANTILES, quantiles, strict=True)}
+    return Estimate(value=value, sd=sd, quantiles=by_level)
 
 
 def _correlations(draws: TrackPosterior) -> list[list[float]]:

@@ -5,7 +5,6 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -19,7 +18,9 @@ from models.prognosis.first_passage import weighted_quantiles
 from models.prognosis.from_parameters import PressureLevel, slope_paths
 from models.tracking.filters.grid import Grid
 from models.tracking.posterior import TrackPosterior, mixture
-from service.api.life import ALIASES
+from service.api.life import ALIASES, LifeNumber
+from service.api.over_life import MeasuredEngagement
+from service.api.run import Evaluation, Loop
 from service.channels import PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM, bar, whole
 from service.clutch.analysis import LevelFit, Value
 from service.clutch.assumptions import ALL_PRESSURES, MEAN_COF, Assumptions
@@ -109,13 +110,14 @@ class ChosenLife:
     of: int
     held: tuple[Event, ...]
 
-    def item(self) -> dict[str, Any]:
-        return {
-            "number": self.number,
-            "of": self.of,
-            "from_cycles": None if self.life is None else whole(self.life.origin),
-            "rebuild": None if self.life is None else self.life.name or None,
-        }
+    def item(self) -> LifeNumber:
+        """The life as an answer names it."""
+        return LifeNumber(
+            number=self.number,
+            of=self.of,
+            from_cycles=None if self.life is None else whole(self.life.origin),
+            rebuild=None if self.life is None else self.life.name or None,
+        )
 
 
 def chosen_life(state: ClutchHistory, number: int | None = None, at_cycles: float | None = None) -> ChosenLife:
@@ -256,8 +258,8 @@ class MeasuredLife:
     geometry: Geometry
     fraction: float
     levels: Mapping[str, Sequence[LevelFit]]
-    receipts: Mapping[str, dict[str, Any]]
-    engagements: Sequence[Mapping[str, Any]] = ()
+    receipts: Mapping[str, Evaluation]
+    engagements: Sequence[MeasuredEngagement] = ()
     filters: States = field(default_factory=dict)
 
     @cached_property
@@ -291,9 +293,9 @@ class MeasuredLife:
         return {level: self.life.at(self.assumptions, level) for level in self.life.reference}
 
     def _engagement_series(self, quantity: Quantity) -> Series:
-        estimates = {row["run_id"]: row["indicators"][quantity.internal] for row in self.engagements}
+        estimates = {row.run_id: getattr(row.indicators, quantity.internal) for row in self.engagements}
         values = [estimates.get(event.run_id) for event in self.life.events]
-        at_events = [None if value is None else (value["value"], value["sd"]) for value in values]
+        at_events = [None if value is None else (value.value, value.sd) for value in values]
         return self.life.series(self.assumptions, quantity.internal, ALL_PRESSURES, at_events)
 
     def _slopes(self, level: float, speed_rpm: float) -> Series:
@@ -309,11 +311,11 @@ class MeasuredLife:
     def _loop_series(self, quantity: Quantity) -> Iterator[Series]:
         """One series for each pressure and frequency of the friction loops."""
         by_event = [
-            self.receipts[event.run_id]["loops"] if event.kind == DYNAMIC and event.run_id in self.receipts else []
+            self.receipts[event.run_id].loops if event.kind == DYNAMIC and event.run_id in self.receipts else []
             for event in self.life.events
         ]
-        loops = [loop for of_event in by_event for loop in of_event if loop["frequency_hz"] is not None]
-        for frequency in sorted({rounded_frequency(loop["frequency_hz"]) for loop in loops}):
+        measured = [loop.frequency_hz for of_event in by_event for loop in of_event]
+        for frequency in sorted({rounded_frequency(each) for each in measured if each is not None}):
             values = [_values(of_event, LOOP_COLUMNS[quantity.internal], frequency) for of_event in by_event]
             levels: list[float] = []
             for pressure in sorted(pressure for of_event in values for pressure in of_event):
@@ -336,16 +338,16 @@ def slope_of(curve: LevelFit, geometry: Geometry, speed_rpm: float) -> Value | N
     return cof_slope(curve.fit, velocity, geometry.torque_per_cof(curve.mean_pressure))
 
 
-def _values(loops: Sequence[Mapping[str, Any]], columns: tuple[str, str], frequency: float) -> dict[float, Value]:
+def _values(loops: Sequence[Loop], columns: tuple[str, str], frequency: float) -> dict[float, Value]:
     """A quantity of the loops of one frequency by pressure [Pa], the last of a pressure's; where it is determined."""
     name, deviation = columns
     return {
-        loop["pressure_bar"] * PASCALS_PER_BAR: (loop[name], loop[deviation])
+        loop.pressure_bar * PASCALS_PER_BAR: (value, sd)
         for loop in loops
-        if loop["frequency_hz"] is not None
-        and rounded_frequency(loop["frequency_hz"]) == frequency
-        and loop[name] is not None
-        and loop[deviation] is not None
+        if loop.frequency_hz is not None
+        and rounded_frequency(loop.frequency_hz) == frequency
+        and (value := getattr(loop, name)) is not None
+        and (sd := getattr(loop, deviation)) is not None
     }
 
 

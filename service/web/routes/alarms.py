@@ -183,9 +183,9 @@ async def _tested(context: Context, names: list[str]) -> Response:
     context.outbox.wake()
     items = await until_ended(
         partial(alarms.delivered, context.database, names),
-        lambda rows: all(row["state"] != "waiting" for row in rows),
+        lambda rows: all(row.state != "waiting" for row in rows),
         _TEST_SECONDS,
     )
-    delivered = sum(row["state"] == "delivered" for row in items)
+    delivered = sum(row.state == "delivered" for row in items)
     message = f"{delivered} of {len(items)} receivers took the test" if items else "there is no receiver: add a webhook"
-    return json_answer({"deliveries": items, "message": message})
+    return json_answer(api.TestedOut(deliveries=items, message=message))

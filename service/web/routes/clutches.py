@@ -12,7 +12,7 @@ from service.answers import clutch_list, fleet_priors, runs, scores
 from service.answers.cache import to_json
 from service.answers.degradation import degradation
 from service.api.clutch import ClutchEdit, ClutchIn, ClutchOut, ClutchPage
-from service.api.fleet import FleetPriorPage, FleetScores, FleetTotals
+from service.api.fleet import FleetPriorPage, FleetScores, FleetTotals, Scores
 from service.api.life import Method
 from service.api.parameters import Archived, ClutchId, ClutchStateName, Find, Held, Offset, Sort
 from service.api.run import ChangePage
@@ -51,11 +51,11 @@ async def register_clutch(request: Request, context: auth.OwnIngester) -> Respon
     auth.require_clutch(auth.grant_of(request), fields.clutch_id)
     clutch, new = await run_in_threadpool(_register, context, fields)
     if new:
-        await responses.begin_computed(context, str(clutch["clutch_id"]), degradation)
-    return responses.json_answer(clutch, 201 if new else 200, Location=f"/v1/clutches/{clutch['clutch_id']}")
+        await responses.begin_computed(context, clutch.clutch_id, degradation)
+    return responses.json_answer(clutch, 201 if new else 200, Location=f"/v1/clutches/{clutch.clutch_id}")
 
 
-def _register(context: Context, clutch: ClutchIn) -> tuple[dict[str, object], bool]:
+def _register(context: Context, clutch: ClutchIn) -> tuple[ClutchOut, bool]:
     new = registration.register(context.database, clutch, created_at=responses.now())
     return clutch_list.look_up(context.database, clutch.clutch_id), new
 
@@ -133,11 +133,11 @@ async def list_changes(of: responses.PageOf) -> Response:
 @fleet_router.get("/priors", response_model=FleetPriorPage, responses=READING)
 async def priors(request: Request, context: auth.Reader, part: responses.WholePaged) -> Response:
     """The priors learned from the clutches of each kind."""
-    return await responses.answer(request, lambda: part.sliced(fleet_priors.newest(context.database)))
+    return await responses.answer(request, fleet_priors.page, context.database, part)
 
 
 @fleet_router.get("/scores", response_model=FleetScores, responses=READING)
 async def fleet_scores(request: Request, context: auth.Reader, method: Method = "particle") -> Response:
     """Scores of the predictions of all ended lives."""
-    scored = await responses.computed_of_each(request, context, scores.scores_of_clutch, method)
+    scored = await responses.computed_of_each(request, context, Scores, scores.scores_of_clutch, method)
     return await responses.answer(request, scores.scores_of_fleet, scored, method=method)

@@ -52,11 +52,11 @@ async def post_diagnosis(request: Request, context: Ingester, clutch_id: ClutchI
     preferred = responses.preferred_wait(prefer)
     wait = WAIT_SECONDS if preferred is None else preferred
     look = partial(diagnoses.diagnosis, context.database, clutch_id, diagnosis_id)
-    report = await responses.until_ended(look, lambda diagnosis: diagnosis["status"] != "running", wait)
+    report = await responses.until_ended(look, lambda diagnosis: diagnosis.status != "running", wait)
     headers = {"Location": f"/v1/clutches/{clutch_id}/diagnoses/{diagnosis_id}"}
     if preferred is not None:
         headers["Preference-Applied"] = f"wait={wait}"
-    status = 202 if report["status"] == "running" else 201
+    status = 202 if report.status == "running" else 201
     return responses.json_answer(report, status, **headers)
 
 

@@ -1,8 +1,5 @@
 """The CSV exports: every table of the API as rows for a spreadsheet."""
 
-import json
-from typing import Any
-
 from fastapi import APIRouter, Request
 from fastapi.responses import Response
 
@@ -17,9 +14,13 @@ from service.answers import (
     series,
     stribeck,
 )
-from service.api.life import Method
-from service.api.over_life import LoopItem, SeriesItem
+from service.api.diagnosis import PlanOut
+from service.api.fleet import FleetPriorPage, FleetScores, Scores
+from service.api.inspection import InspectionPage
+from service.api.life import Method, RemainingLife
+from service.api.over_life import Degradation, LoopPage, SeriesPage, StribeckPage, Surfaces
 from service.api.parameters import DiagnosisId, LifeNumber, Quantity, State, TrackedQuantity
+from service.api.run import ChangePage, RunPage
 from service.paging import Part
 from service.web import responses
 from service.web.auth import Reader
@@ -31,28 +32,23 @@ from storage.engine.database import Database
 router = APIRouter(prefix="/v1/clutches/{clutch_id}", tags=["spreadsheets"], responses=READING)
 fleet_router = APIRouter(prefix="/v1/fleet", tags=["spreadsheets"], responses=READING)
 
-_RUNS, _CHANGES = ExportedTable(runs.rows, runs.COLUMNS), ExportedTable(runs.trail_rows, runs.TRAIL_COLUMNS)
-_INSPECTIONS = ExportedTable(inspections.rows, inspections.COLUMNS)
-_PLAN = ExportedTable(diagnoses.plan_rows, diagnoses.PLAN_COLUMNS)
-_REMAINING = ExportedTable(remaining_life.rows, remaining_life.COLUMNS)
-_DEGRADATION = ExportedTable(degradation.rows, degradation.COLUMNS)
-_STRIBECK = ExportedTable(stribeck.rows, ("run_id", "cycles", "held_runs"))
-_SURFACES = ExportedTable(stribeck.surface_rows, ("cycles", "pressure_bar"))
-_SCORES = ExportedTable(scores.rows, ("end_of_life_cycles", "cycles"))
-_LOOPS = ExportedTable(
-    lambda loops: [loop | {"held_runs": loops["held_runs"]} for loop in loops["items"]],
-    (*LoopItem.model_fields, "held_runs"),
-)
-_SERIES = ExportedTable(lambda series: series["items"], tuple(SeriesItem.model_fields))
-_STAGES = ExportedTable(
-    lambda fleet: [*fleet["stages"], {"share_of_life": None} | fleet["overall"]], ("share_of_life",)
-)
-_PRIORS = ExportedTable(fleet_priors.rows, fleet_priors.COLUMNS)
+_RUNS = ExportedTable(RunPage, runs.rows, runs.COLUMNS)
+_CHANGES = ExportedTable(ChangePage, runs.trail_rows, runs.TRAIL_COLUMNS)
+_INSPECTIONS = ExportedTable(InspectionPage, inspections.rows, inspections.COLUMNS)
+_PLAN = ExportedTable(PlanOut, diagnoses.plan_rows, diagnoses.PLAN_COLUMNS)
+_REMAINING = ExportedTable(RemainingLife, remaining_life.rows, remaining_life.COLUMNS)
+_DEGRADATION = ExportedTable(Degradation, degradation.rows, degradation.COLUMNS)
+_STRIBECK = ExportedTable(StribeckPage, stribeck.rows, ("run_id", "cycles", "held_runs"))
+_SURFACES = ExportedTable(Surfaces, stribeck.surface_rows, ("cycles", "pressure_bar"))
+_SCORES = ExportedTable(Scores, scores.rows, ("end_of_life_cycles", "cycles"))
+_LOOPS = ExportedTable(LoopPage, runs.loop_rows, (*runs.LOOP_COLUMNS, "held_runs"))
+_SERIES = ExportedTable(SeriesPage, series.rows, series.COLUMNS)
+_STAGES = ExportedTable(FleetScores, scores.stage_rows, ("share_of_life",))
+_PRIORS = ExportedTable(FleetPriorPage, fleet_priors.rows, fleet_priors.COLUMNS)
 
 
-def _receipts(database: Database, clutch_id: str, part: Part, state: str | None) -> dict[str, Any]:
-    answer: dict[str, Any] = json.loads(runs.page_as_json(database, clutch_id, part, state))
-    return answer
+def _receipts(database: Database, clutch_id: str, part: Part, state: str | None) -> RunPage:
+    return RunPage.model_validate_json(runs.page_as_json(database, clutch_id, part, state))
 
 
 @router.get("/runs.csv", response_class=Response)
@@ -145,11 +141,11 @@ async def fleet_scores_csv(
     request: Request, context: Reader, part: responses.WholePaged, method: Method = "particle"
 ) -> Response:
     """Scores of all predictions, one row per stage of life; the last row has all."""
-    scored = await responses.computed_of_each(request, context, scores.scores_of_clutch, method)
+    scored = await responses.computed_of_each(request, context, Scores, scores.scores_of_clutch, method)
     return await responses.table(request, lambda: _STAGES.page(scores.scores_of_fleet(scored, method=method), part))
 
 
 @fleet_router.get("/priors.csv", response_class=Response)
 async def priors_csv(request: Request, context: Reader, part: responses.WholePaged) -> Response:
     """The fleet's priors, one row each."""
-    return await responses.table(request, lambda: _PRIORS.page(part.sliced(fleet_priors.newest(context.database))))
+    return await responses.table(request, lambda: _PRIORS.page(fleet_priors.page(context.database, part)))

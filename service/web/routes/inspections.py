@@ -66,7 +66,7 @@ async def post_inspection(request: Request, context: Ingester, clutch_id: Clutch
     sent = await responses.sent(request, InspectionIn)
     store = partial(inspect_clutch.inspect, context.database, clutch_id, sent)
     inspection, new = await run_in_threadpool(store, by=grant_of(request).name, at=responses.now())
-    address = f"/v1/clutches/{clutch_id}/inspections/{inspection['inspection_id']}"
+    address = f"/v1/clutches/{clutch_id}/inspections/{inspection.inspection_id}"
     return responses.json_answer(inspection, 201 if new else 200, Location=address)
 
 
@@ -114,7 +114,7 @@ async def post_photograph(
     media_type = _media_type(request)
     add = partial(inspect_clutch.add_photograph, context.database, clutch_id, inspection_id, await _file(request))
     photograph, new = await run_in_threadpool(add, media_type, by=grant_of(request).name, at=responses.now())
-    address = f"/v1/clutches/{clutch_id}/inspections/{inspection_id}/photographs/{photograph['photograph_id']}"
+    address = f"/v1/clutches/{clutch_id}/inspections/{inspection_id}/photographs/{photograph.photograph_id}"
     return responses.json_answer(photograph, 201 if new else 200, Location=address)
 
 

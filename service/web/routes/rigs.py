@@ -50,7 +50,7 @@ async def list_rigs(request: Request, context: OwnReader, part: Paged) -> Respon
 @router.get("/{name}", response_model=RigOut, responses=READING)
 async def read_rig(request: Request, context: OwnReader, name: parameters.RigName) -> Response:
     """A saved rig profile."""
-    return await answer(request, rigs.look_up, context.database, name)
+    return await answer(request, rigs.rig_profile, context.database, name)
 
 
 @router.post("", status_code=201, **taking(RigIn, RigOut, EXAMPLE, SENDING, {200: "The profile existed before"}))
@@ -74,7 +74,7 @@ async def _saved(request: Request, context: Context, name: str | None) -> Respon
         raise InvalidError.of(message, code="other_name", pointer="/name")
     by, replacing = grant_of(request).name, name is not None
     saved, new = await run_in_threadpool(save, context.database, rig, by=by, at=now(), replacing=replacing)
-    return json_answer(saved.model_dump(mode="json"), 201 if new else 200, Location=f"/v1/rigs/{saved.name}")
+    return json_answer(saved, 201 if new else 200, Location=f"/v1/rigs/{saved.name}")
 
 
 @import_router.post("/preview", response_model=Preview, responses=CHANGING, openapi_extra=FILE_BODY)

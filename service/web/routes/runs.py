@@ -91,7 +91,7 @@ async def post_run_file(
         taken_in = context.workers.submit(Lane.FILES, ingest_posted, clutch_id, read, responses.now(), by, path)
         receipt, new = await asyncio.wrap_future(taken_in)
     return responses.json_answer(
-        receipt, 201 if new else 200, Location=f"/v1/clutches/{clutch_id}/runs/{receipt['run_id']}"
+        receipt, 201 if new else 200, Location=f"/v1/clutches/{clutch_id}/runs/{receipt.run_id}"
     )
 
 
@@ -164,7 +164,7 @@ async def post_run(request: Request, context: Ingester, clutch_id: parameters.Cl
             turn=clutch_id,
         )
         receipt, new = await asyncio.wrap_future(taken_in)
-    address = f"/v1/clutches/{clutch_id}/runs/{receipt['run_id']}"
+    address = f"/v1/clutches/{clutch_id}/runs/{receipt.run_id}"
     return responses.json_answer(receipt, 201 if new else 200, Location=address)
 
 
@@ -260,4 +260,4 @@ async def _changed(
     edit = partial(change_run.change, action=action, reason=reason, by=by, at=at, **more)
     if isinstance(run_id, str):
         return responses.json_answer((await responses.changed(of, edit, [run_id]))[0])
-    return responses.json_answer({"items": await responses.changed(of, edit, run_id), "next": None})
+    return responses.json_answer(RunPage(items=await responses.changed(of, edit, run_id), next=None))

@@ -21,6 +21,7 @@ from service.answers.cache import (
     shared_answer,
     to_json,
 )
+from service.api.base import Answer, Real
 from service.settings import CODE_VERSION
 from service.web.limits import MAX_CACHED_BYTES
 from storage import clutches
@@ -46,6 +47,11 @@ def made(cache: AnswerCache, name: str, body: bytes) -> bool:
 
     assert cache.answer(name, 1, make).body == body
     return bool(calls)
+
+
+class Named(Answer):
+    name: str
+    value: Real = 0.0
 
 
 def test_the_least_lately_asked_for_goes_first_and_no_more_than_must() -> None:
@@ -139,9 +145,11 @@ def test_what_fails_fails_for_all_and_is_tried_again() -> None:
 
 
 def test_no_number_leaves_that_json_cannot_carry() -> None:
-    assert to_json({"µ": 0.1}) == '{"µ":0.1}'.encode()
+    assert to_json(Named(name="µ", value=0.1)) == '{"name":"µ","value":0.1}'.encode()
+    assert to_json(Named(name="µ", value=1)) == '{"name":"µ","value":1}'.encode()
+    assert to_json(Named(name="µ")) == '{"name":"µ"}'.encode()
     with pytest.raises(ValueError, match="JSON"):
-        to_json({"mean_cof": float("nan")})
+        to_json(Named(name="", value=float("nan")))
 
 
 def test_of_several_services_on_a_server_one_computes(on_server: Database) -> None:
@@ -197,8 +205,8 @@ def test_a_build_is_told_by_its_code_and_by_the_names_of_its_files(tmp_path: Pat
 def test_an_answer_that_cannot_be_shared_is_an_answer_all_the_same(
     in_file: Database, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def query(database: Database, clutch_id: str) -> dict[str, str]:  # noqa: ARG001
-        return {"clutch_id": clutch_id}
+    def query(database: Database, clutch_id: str) -> Named:  # noqa: ARG001
+        return Named(name=clutch_id)
 
     def gone(*_: object) -> None:
         raise StorageUnavailable("the connection is gone")
@@ -207,7 +215,7 @@ def test_an_answer_that_cannot_be_shared_is_an_answer_all_the_same(
     monkeypatch.setattr(in_file, "shared_answer", gone)
     monkeypatch.setattr(in_file, "share", gone)
     assert shared_answer(in_file, query, "c1") is None
-    assert revision_and_json(in_file, query, "c1", ()) == (0, b'{"clutch_id":"c1"}')
+    assert revision_and_json(in_file, query, "c1", ()) == (0, b'{"name":"c1"}')
     assert [record.levelname for record in caplog.records] == ["WARNING"] * 3
 
 

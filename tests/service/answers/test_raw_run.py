@@ -18,6 +18,9 @@ from fastapi.testclient import TestClient
 from models.arrays import FloatArray
 from service.answers import raw_run
 from service.answers.raw_run import entity_tag, write_run
+from service.clutch import items
+from service.clutch.analysis import Analysis
+from service.clutch.incoming_run import IncomingRun
 from service.errors import NotAcceptableError, NotFoundError
 from service.web import readiness
 from storage import clutches, raw_columns, runs
@@ -25,7 +28,7 @@ from storage.blobs.stores import DATABASE, BlobStore, open_store
 from storage.engine.database import Database
 from storage.engine.opening import open_database
 from tests.growth import peak
-from tests.service.clients import client_on, clutchlife
+from tests.service.clients import as_answered, client_on, clutchlife
 from tests.storage.samples import clutch_row, new_run, read_from, write_to
 from tests.support import stationary
 
@@ -50,7 +53,8 @@ def dynamic(samples: int = SAMPLES) -> dict[str, FloatArray]:
 
 def store(database: Database, columns: dict[str, FloatArray], run_id: str) -> None:
     """A run with its channels, not evaluated: what its receipt says is no matter here."""
-    receipt = {"run_id": run_id, "cycles": 0, "fits": []}
+    run = IncomingRun(kind="dynamic_stribeck", cycles=0.0, run_id=run_id)
+    receipt = as_answered(items.receipt(CLUTCH, run, Analysis(), received_at="2026-11-02T08:00:00.000+00:00"))
     with database.writing() as connection:
         row = replace(new_run(), clutch_id=CLUTCH, run_id=run_id, receipt=receipt)
         raw_columns.write(connection, runs.insert(connection, row), raw_columns.encoded(columns))

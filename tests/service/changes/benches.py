@@ -24,12 +24,13 @@ from service.clutch.timeline import Shown
 from service.errors import Notice
 from service.paging import WHOLE
 from service.runs.json_run import read_run
-from service.web.responses import to_json
 from storage import changes, diagnoses, results
 from storage.diagnoses import DiagnosisRow
+from storage.encoding import to_text
 from storage.engine.database import Database
 from storage.engine.opening import open_database
 from tests.service.changes import stand_in_engine
+from tests.service.clients import as_answered
 from tests.support import stationary, torque_nm
 
 CLUTCH = "c1"
@@ -93,7 +94,7 @@ def loop_channels() -> dict[str, list[float]]:
 
 def send_to(database: Database, run: Mapping[str, Any]) -> dict[str, Any]:
     """Post a run to a database; its receipt."""
-    return ingest(database, CLUTCH, read_run(to_json(run)), received_at=AT)[0]
+    return as_answered(ingest(database, CLUTCH, read_run(to_text(run).encode()), received_at=AT)[0])
 
 
 class Bench:
@@ -140,7 +141,7 @@ class Bench:
 
     def _changed(self, run_id: str, **wanted: Any) -> dict[str, Any]:
         (receipt,) = change_run.change(self.database, CLUTCH, [run_id], **wanted, **WHO)
-        return receipt
+        return as_answered(receipt)
 
     def receipts(self) -> dict[str, dict[str, Any]]:
         page = json.loads(runs.page_as_json(self.database, CLUTCH, WHOLE))
@@ -157,10 +158,11 @@ class Bench:
         if degradation_too:
             named["degradation"] = degradation.degradation(database, CLUTCH)
         named["stribeck"] = stribeck.curves(database, CLUTCH, WHOLE)
-        named["series"] = series.series(database, CLUTCH, WHOLE, None)["items"]
-        named["loops"] = runs.loops(database, CLUTCH, WHOLE)["items"]
+        named["series"] = series.series(database, CLUTCH, WHOLE, None)
+        named["loops"] = runs.loops(database, CLUTCH, WHOLE)
         named["scores"] = scores.scores_of_clutch(database, CLUTCH, method="particle")
-        named["clutch"] = clutch_list.look_up(database, CLUTCH) | {"held": None}
+        named["clutch"] = clutch_list.look_up(database, CLUTCH).model_copy(update={"held": 0})
+        named = {name: as_answered(answer) for name, answer in named.items()}
         named["runs"] = [
             {name: value for name, value in receipt.items() if name not in OF_THE_AUDIT}
             for receipt in self.receipts().values()

@@ -33,6 +33,7 @@ from tests.service.changes.benches import (
     send_to,
     stood_in,
 )
+from tests.service.clients import as_answered
 from tests.service.jobs.replaying import replay_clutch
 from tests.storage.samples import read_from, write_to
 from tests.support import one_quick
@@ -177,7 +178,7 @@ def test_several_held_runs_are_confirmed_in_one_step_or_none(benches: tuple[Benc
     with pytest.raises(NotFoundError, match="nobody"):
         change_run.change(together.database, CLUTCH, [*asked, "nobody"], **confirming)
     assert revision_of(together) == revision
-    receipts = change_run.change(together.database, CLUTCH, asked, **confirming)
+    receipts = list(map(as_answered, change_run.change(together.database, CLUTCH, asked, **confirming)))
     assert [(one["run_id"], one["state"]) for one in receipts] == [(name, "accepted") for name in asked]
     assert revision_of(together) == revision + 1
     confirmed = [each for each in trail_of(together) if each["action"] == "confirm"]
@@ -255,8 +256,8 @@ def test_a_diagnosis_of_what_was_changed_meanwhile_is_stale_and_not_adopted(benc
     assert bench.answers() == before
     run_diagnosis.finish(bench.database, job, ended, at=AT, adopt=lambda *_: pytest.fail("nobody wants it adopted"))
     stale = diagnosis_answers.diagnosis(bench.database, CLUTCH, asked_for)
-    assert (stale["status"], stale["stale"]) == ("finished", True)
-    assert not diagnosis_answers.diagnosis(bench.database, CLUTCH, fresh)["stale"]
+    assert (stale.status, stale.stale) == ("finished", True)
+    assert not diagnosis_answers.diagnosis(bench.database, CLUTCH, fresh).stale
 
 
 def revision_of(bench: Bench) -> int:
@@ -264,7 +265,7 @@ def revision_of(bench: Bench) -> int:
 
 
 def trail_of(bench: Bench) -> list[dict[str, Any]]:
-    return run_answers.trail(bench.database, CLUTCH, WHOLE)["items"]
+    return as_answered(run_answers.trail(bench.database, CLUTCH, WHOLE))["items"]
 
 
 @pytest.mark.slow

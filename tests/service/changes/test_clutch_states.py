@@ -14,6 +14,7 @@ from storage import clutches, diagnoses, jobs
 from storage.clutches import ClutchSelection
 from storage.diagnoses import FINISHED
 from tests.service.changes.benches import AT, CLUTCH, EXTENSION, WHO, Bench, body
+from tests.service.clients import as_answered
 from tests.service.jobs.replaying import replay_clutch
 from tests.storage.samples import read_from, write_to
 from tests.support import one_quick
@@ -111,8 +112,8 @@ class Written:
 
 def stated_anew(bench: Bench) -> str:
     """The state by the rules of the docs, from what the API says of the clutch."""
-    item = clutch_list.look_up(bench.database, CLUTCH)
-    life = remaining_life(bench.database, CLUTCH, "particle", None, None)
+    item = as_answered(clutch_list.look_up(bench.database, CLUTCH))
+    life = as_answered(remaining_life(bench.database, CLUTCH, "particle", None, None))
     if life["status"] == "reached":
         return "failure"
     if life["status"] != "insufficient_data":
@@ -139,9 +140,9 @@ def test_the_stored_state_follows_from_all_rows(bench: Bench, seed: int) -> None
         expected = stated_anew(bench)
         (row,) = written.rows()
         met.add(row.state)
-        shown = clutch_list.look_up(bench.database, CLUTCH)["state"]["name"]
+        shown = clutch_list.look_up(bench.database, CLUTCH).state.name
         assert row.state == shown == expected, written.did
-        totals = clutch_list.totals(bench.database, ClutchSelection())
+        totals = as_answered(clutch_list.totals(bench.database, ClutchSelection()))
         assert totals["states"] == {name: int(name == expected) for name in totals["states"]}
     print(seed, met, written.did)
     assert len(met) > 1, "the state never changed: nothing was tested"

@@ -181,7 +181,7 @@ def test_a_run_that_would_carry_on_damaged_filters_has_the_life_tracked_again(be
     before = stored(bench.database)
     with bench.database.writing() as connection:
         connection.execute(text("UPDATE filter_state SET arrays = x'00'"))
-    assert degradation.degradation(bench.database, CLUTCH)["items"]
+    assert degradation.degradation(bench.database, CLUTCH).items
     assert replay_clutch(bench.database, CLUTCH) == 2
     assert stored(bench.database) == before
     bench.send_tests(2000)
@@ -212,7 +212,7 @@ def test_a_run_that_another_process_stores_after_it_was_not_found_is_a_repeat(
 
     calls = overtaken(monkeypatch, runs, "get", bench.database, store, at=2)
     receipt, new = ingest(bench.database, CLUTCH, oil_change(), received_at=AT)
-    assert (receipt["duplicate"], new, calls[:2]) == (True, False, [None, None])
+    assert (receipt.duplicate, new, calls[:2]) == (True, False, [None, None])
     assert read_from(bench.database, clutches.revision, CLUTCH) == 1
 
 

@@ -13,6 +13,7 @@ from service.errors import ArchivedError, ConflictError
 from service.paging import WHOLE
 from storage.clutches import ClutchSelection
 from tests.service.changes.benches import AT, CLUTCH, WHO, Bench, assert_same, body, overtaken, send_to
+from tests.service.clients import as_answered
 
 HISTORY = (("test", 0.0), ("duty", 400.0), ("loop", 500.0), ("oil_change", 1500.0), ("test", 2000.0))
 
@@ -67,11 +68,11 @@ def test_a_field_is_replaced_as_a_whole_and_the_trail_says_what_changed(new_benc
     bench = new_bench({"geometry": {"friction_faces": 6, "pressure_factor": 1.1}})
     edit(bench, geometry={"friction_faces": 4}, fluid="ATF")
     edit(bench, geometry={"friction_faces": 4})  # as it is
-    (entry,) = run_answers.trail(bench.database, CLUTCH, WHOLE)["items"]
+    (entry,) = as_answered(run_answers.trail(bench.database, CLUTCH, WHOLE))["items"]
     assert (entry["action"], entry["run_id"], entry["reason"]) == ("edit", None, "the drawing says so")
     assert entry["before"].keys() == entry["after"].keys() == {"geometry"}
     assert (entry["after"]["geometry"]["friction_faces"], entry["after"]["geometry"]["pressure_factor"]) == (4, 1.0)
-    assert clutch_list.look_up(bench.database, CLUTCH)["revision"] == 1
+    assert clutch_list.look_up(bench.database, CLUTCH).revision == 1
 
 
 def test_the_record_in_force_and_the_one_that_was_registered_are_known(new_bench: Callable[..., Bench]) -> None:
@@ -87,7 +88,7 @@ def test_the_record_in_force_and_the_one_that_was_registered_are_known(new_bench
     assert not register("third")
     with pytest.raises(ConflictError):
         register("second")
-    assert clutch_list.look_up(bench.database, CLUTCH)["fluid"] == "third"
+    assert clutch_list.look_up(bench.database, CLUTCH).fluid == "third"
 
 
 def test_an_archived_clutch_is_left_out_takes_in_no_run_and_still_teaches(bench: Bench) -> None:
@@ -99,15 +100,13 @@ def test_an_archived_clutch_is_left_out_takes_in_no_run_and_still_teaches(bench:
     with pytest.raises(ArchivedError, match="archived"):
         bench.send(body("test", "b", 1000.0))
     assert bench.send(known)["duplicate"]
-    totals = [
-        clutch_list.totals(bench.database, ClutchSelection(archived=archived))["all"] for archived in (False, True)
-    ]
+    totals = [clutch_list.totals(bench.database, ClutchSelection(archived=archived)).all for archived in (False, True)]
     assert totals == [0, 1]
-    assert learn_fleet.lessons_of(learn_fleet._state(bench.database, CLUTCH))[0]["fluid"] == "ATF"
+    assert learn_fleet.lessons_of(learn_fleet._state(bench.database, CLUTCH))[0].fluid == "ATF"
     edit(bench, archived=False)
     assert bench.answers() == before
     bench.send(body("test", "b", 1000.0))
-    actions = [entry["action"] for entry in run_answers.trail(bench.database, CLUTCH, WHOLE)["items"]]
+    actions = [entry.action for entry in run_answers.trail(bench.database, CLUTCH, WHOLE).items]
     assert actions == ["unarchive", "archive"]
 
 

@@ -13,6 +13,7 @@ from typer.testing import CliRunner
 from models.degradation.severity import Severity
 from service import repository
 from service.api.clutch import ClutchIn
+from service.api.fleet import Kind
 from service.changes import learn_fleet
 from service.changes.edit_clutch import register
 from service.changes.ingest_run import ingest
@@ -24,9 +25,8 @@ from service.jobs.change import ChangeTask
 from service.jobs.queue import work_of_change
 from service.runs.json_run import read_run
 from service.settings import Settings
-from service.web.responses import to_json
 from storage import jobs
-from storage.encoding import Json
+from storage.encoding import to_text
 from storage.engine.database import Database
 from storage.engine.opening import open_database
 from tests.service.clients import client_on, post_run
@@ -90,7 +90,7 @@ def test_a_fleet_teaches_the_next_clutch_and_nobody_itself(url: str) -> None:
         assert (life(client, "new")["prior"]["clutches"], life(client, "old-0")["prior"]["name"]) == (3, "weak")
         post(client, "old-3", 6500.0)
         done = refresh(url)
-        assert [kind["friction_material"] for kind in done.kinds] == ["paper"]
+        assert [kind.friction_material for kind in done.kinds] == ["paper"]
         assert set(done.changed) == {"old-0", "old-1", "old-2", "old-3", "new"}
         after = {name: life(client, name) for name in before}
         assert after["new"]["prior"] == {"name": "fleet", "version": 2, "clutches": 4}
@@ -160,7 +160,7 @@ def test_an_end_has_its_own_kind_learn_and_goes_before_the_rest_of_another(
     register(in_file, other, created_at=AT)
     taught: list[str] = []
 
-    def lessons_of(state: ClutchHistory) -> tuple[Json, list[learn_fleet.Lesson]]:
+    def lessons_of(state: ClutchHistory) -> tuple[Kind, list[learn_fleet.Lesson]]:
         taught.append(state.clutch_id)
         return _lessons_of(state)
 
@@ -169,7 +169,7 @@ def test_an_end_has_its_own_kind_learn_and_goes_before_the_rest_of_another(
 
     def declare(clutch_id: str) -> None:
         end = {"kind": "maintenance", "event": "end_of_life", "cycles": 6000}
-        ingest(in_file, clutch_id, read_run(to_json(end)), received_at=AT)
+        ingest(in_file, clutch_id, read_run(to_text(end).encode()), received_at=AT)
 
     def do_next() -> tuple[dict[str, int], dict[str, str]]:
         job = write_to(in_file, jobs.claim, "here", [jobs.FLEET_REFRESH], lease=60.0, at=AT)

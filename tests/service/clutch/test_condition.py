@@ -15,6 +15,9 @@ from models.diagnosis.experiments.candidates import TRIALS
 from models.prognosis.criteria import QUANTILES
 from service.answers import clutch_list, degradation, series
 from service.answers.remaining_life import remaining_life
+from service.api.clutch import AdvisedTest, LatestDiagnosis
+from service.api.life import LifePrediction
+from service.clutch.assumptions import ALL_PRESSURES, Assumptions
 from service.clutch.condition import (
     STATE_WORDS,
     bound_in_words,
@@ -27,10 +30,12 @@ from service.clutch.condition import (
     with_held_runs,
 )
 from service.clutch.criteria import MAX_LINE_POINTS
+from service.clutch.items import insufficient
 from service.clutch.notices import filters_disagree
 from service.clutch.timeline import Event
 from service.paging import WHOLE
 from tests.service.changes.benches import CLUTCH, Bench, body, stood_in
+from tests.service.clients import as_answered
 from tests.support import one_quick, stationary
 
 #: The present, as the answers state it.
@@ -47,11 +52,11 @@ def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Bench]:
 
 
 def now(bench: Bench, method: str = "particle", pressure: float | None = None) -> dict[str, Any]:
-    return remaining_life(bench.database, CLUTCH, method, pressure, None)
+    return as_answered(remaining_life(bench.database, CLUTCH, method, pressure, None))
 
 
 def item(bench: Bench) -> dict[str, Any]:
-    return clutch_list.look_up(bench.database, CLUTCH)
+    return as_answered(clutch_list.look_up(bench.database, CLUTCH))
 
 
 def test_after_one_test_and_a_block_of_duty_health_is_unknown_and_mean_cof_is_the_measured_one(bench: Bench) -> None:
@@ -66,10 +71,10 @@ def test_after_one_test_and_a_block_of_duty_health_is_unknown_and_mean_cof_is_th
         assert 0.0 < current["mean_cof_sd"] < 0.05 * measured
         assert [current[name] for name in PRESENT[2:]] == [100, None, None]
         assert set(answer["remaining_cycles"].values()) == {None}
-    for tracked in degradation.degradation(bench.database, CLUTCH)["items"]:
+    for tracked in as_answered(degradation.degradation(bench.database, CLUTCH))["items"]:
         assert tracked["measured"]["cycles"] == [100]
         assert (tracked["coefficients"], tracked["trajectory"]["cycles"]) == (None, [])
-    rows = series.series(bench.database, CLUTCH, WHOLE, None)["items"]
+    rows = as_answered(series.series(bench.database, CLUTCH, WHOLE, None))["items"]
     stated = {row["quantity"]: row["value"] for row in rows if not row["run_id"]}
     assert stated == dict.fromkeys(stated) | {"at_least": 0.0}
     assert item(bench)["state"]["name"] == "check"
@@ -156,8 +161,9 @@ def test_page_and_answer_say_the_same_of_held_runs_before_a_prediction() -> None
     nothing = {"status": "insufficient_data", "remaining_cycles": summary(None)["remaining_cycles"]}
     among = nothing | {"at_least": 0.0}
     known = summary(1800.0, held=1, with_held={"particle": among}, ended=None, **nothing | {"runs_used": 2})
-    (warning,) = with_held_runs(known | {"warnings": ()}, known, among, 1)["warnings"]
-    assert warning["message"].endswith("with it the remaining life is not known: no further cycle is safe")
+    warning = with_held_runs(known, known, among, 1).warning
+    assert warning is not None
+    assert warning.message.endswith("with it the remaining life is not known: no further cycle is safe")
     assert "no further cycle is safe if the held run counts" in top_line(known, disputed=False)["headline"]
 
 
@@ -165,11 +171,16 @@ PACE = {"cycles_per_second": 1000 / 86_400, "moment": 1_796_083_200.0}  # 1,000 
 HELD = {"held": 1, "with_held": {"particle": {"status": "predicted", "at_least": 3149.0, "remaining_cycles": {}}}}
 
 
-def found(causes: list[str], advice: list[str] | None = None, *, adoptable: bool = False) -> dict[str, Any]:
+def found(causes: list[str], advice: list[str] | None = None, *, adoptable: bool = False) -> LatestDiagnosis:
     """A diagnosis as it goes out."""
     verdict = {0: "unexplained_structure", 1: "cause_named"}.get(len(causes), "cause_ambiguous")
     advised = advice and {"test": "stationary test with the oil at 60 °C", "separates": advice}
-    return {"verdict": verdict, "causes": causes, "advice": advised, "adoptable": adoptable}
+    of_row = {"diagnosis_id": "d", "adopted": False, "earlier_life": False}
+    return LatestDiagnosis(verdict=verdict, causes=causes, advice=advised, adoptable=adoptable, **of_row)
+
+
+def advising(test: str, effect: str) -> LatestDiagnosis:
+    return found([effect]).model_copy(update={"advice": AdvisedTest(test=test, separates=[effect])})
 
 
 @pytest.mark.parametrize(
@@ -257,12 +268,12 @@ def found(causes: list[str], advice: list[str] | None = None, *, adoptable: bool
         ),
         (
             summary(9000.0),
-            found(["film"]) | {"advice": {"test": f"stationary test at 5 bar, and {80 * 'x'}", "separates": ["film"]}},
+            advising(f"stationary test at 5 bar, and {80 * 'x'}", "film"),
             "Out of specification: ", "Run the advised tests, first a stationary test at 5 bar: it shows whether film",
         ),
         (
             summary(9000.0),
-            found(["rest_recovery"]) | {"advice": {"test": TRIALS["rests"].text, "separates": ["rest_recovery"]}},
+            advising(TRIALS["rests"].text, "rest_recovery"),
             "Out of specification: ", "Run three more stationary tests, each after the usual cycles; rest two days before "
             "the first and third: it shows whether rest recovery is at work.",
         ),
@@ -271,7 +282,7 @@ def found(causes: list[str], advice: list[str] | None = None, *, adoptable: bool
     ids=str,
 )  # fmt: skip
 def test_the_top_line_answers_and_says_what_to_do(
-    known: dict[str, Any], diagnosis: dict[str, Any] | None, headline: str, action: str
+    known: dict[str, Any], diagnosis: LatestDiagnosis | None, headline: str, action: str
 ) -> None:
     line = top_line(known, disputed=diagnosis is not None, diagnosis=diagnosis)
     assert line["headline"].startswith(headline)
@@ -301,9 +312,9 @@ def test_a_trajectory_goes_on_as_far_as_is_asked(bench: Bench) -> None:
     for cycles in (0.0, 1000.0, 2000.0):
         bench.send(body("test", f"t{cycles:g}", cycles))
     for until, last in ((None, 3000.0), (20_000.0, 20_000.0)):
-        (track,) = degradation.degradation(bench.database, CLUTCH, "ukf", "static_torque_nm", until=until)["items"][:1]
-        assert track["trajectory"]["cycles"][-1] == pytest.approx(last)
-        assert len(track["trajectory"]["median"]) == len(track["trajectory"]["cycles"])
+        track = degradation.degradation(bench.database, CLUTCH, "ukf", "static_torque_nm", until=until).items[0]
+        assert track.trajectory.cycles[-1] == pytest.approx(last)
+        assert len(track.trajectory.median) == len(track.trajectory.cycles)
 
 
 def test_lists_sort_by_the_bound_that_they_show_first_and_statements_say_that_held_runs_lower_it() -> None:
@@ -320,16 +331,21 @@ def test_lists_sort_by_the_bound_that_they_show_first_and_statements_say_that_he
         assert statement_of(summary(9000.0), lower_bound(9000.0, {"at_least": among})) == words
 
 
+def predicted(status: str, remaining: dict[str, float | None]) -> LifePrediction:
+    nothing = insufficient(Assumptions(), 0.0, ALL_PRESSURES, 0.5)
+    return nothing.model_copy(update={"status": status, "remaining_cycles": remaining})
+
+
 @pytest.mark.parametrize(
     ("other", "warns"),
     [((5000, 9000, 30000), False), ((9000, 20000, None), True), ((4000, None, None), True), ((1, 4999, 20000), True)],
 )
 def test_a_median_outside_the_interval_of_another_filter_warns(other: tuple[float | None, ...], warns: bool) -> None:
     answers = {
-        method: {"status": "predicted", "remaining_cycles": dict(zip(("0.05", "0.5", "0.95"), ends, strict=True))}
+        method: predicted("predicted", dict(zip(("0.05", "0.5", "0.95"), ends, strict=True)))
         for method, ends in (("particle", (5000, 8000, 12000)), ("ukf", other))
     }
-    notices = filters_disagree(answers | {"grid": {"status": "insufficient_data", "remaining_cycles": {}}})
+    notices = filters_disagree(answers | {"grid": predicted("insufficient_data", {})})
     assert [notice.code for notice in notices] == ["filters_disagree"] * warns
     assert all("8,000 (90 %: 5,000 to 12,000) by particle" in notice.message for notice in notices)
 
@@ -343,8 +359,8 @@ def test_a_line_is_short_and_ends_with_the_last_value(count: int) -> None:
     events = [Event(run_id=f"{at:g}", kind="maintenance", cycles=100.0 - at, moment=at) for at in (5.0, 10.0, 0.0)]
     both = recent(events, series)  # type: ignore[arg-type]
     last = {"run_id": "10", "kind": "maintenance", "cycles": 90, "at": "1970-01-01T00:00:10+00:00"}
-    said = both["mean_cof"]
-    assert both["last_run"] == last  # made last, whatever its cycles
+    said = both.mean_cof
+    assert as_answered(both.last_run) == last  # made last, whatever its cycles
     assert len(said) <= MAX_LINE_POINTS
     assert said[-1:] == [count - 1] * (count > 0)
     assert len({after - before for before, after in itertools.pairwise(said)}) <= 1

@@ -13,6 +13,7 @@ from models.rig.truth import draw
 from models.tracking.filters.grid import Grid
 from models.tracking.measurement import Measurement
 from models.tracking.prior import weak
+from service.api.life import ModelName
 from service.clutch.assumptions import (
     ALL_PRESSURES,
     FLEET,
@@ -32,7 +33,7 @@ from tests.models.prognosis.test_course_shares import accelerating
 from tests.models.tracking.tracked_series import CAMPAIGN
 from tests.plausibility.bench import Bench
 from tests.score.paper import PLACE, measured_life
-from tests.service.clients import post_run
+from tests.service.clients import as_answered, post_run
 from tests.support import stationary
 
 LIFE = "/v1/clutches/{}/remaining-useful-life"
@@ -79,7 +80,7 @@ def life(*taken: float) -> Life:
 
 
 def assumptions(*weights: float) -> Assumptions:
-    return Assumptions(model=ModelInForce(name={"name": "extended", "effects": []}, weights=weights))
+    return Assumptions(model=ModelInForce(name=ModelName(name="extended", effects=[]), weights=weights))
 
 
 def ends(method: str, of: Life, under: Assumptions) -> tuple[np.ndarray, np.ndarray]:
@@ -132,7 +133,7 @@ def test_a_test_is_odd_only_where_it_is_under_every_draw() -> None:
     for one in (of, odd_under_one, both):
         series = one.pooled(under)
         tracked = advance("particle", series, None, len(CYCLES))
-        said = predict("particle", series, tracked, CYCLES[-1], 0.5, tests=of.tests)
+        said = as_answered(predict("particle", series, tracked, CYCLES[-1], 0.5, tests=of.tests))
         warned.append("off_track" in {warning["code"] for warning in said["warnings"]})
     assert warned == [False, False, True]
 
@@ -161,7 +162,7 @@ def test_a_prediction_says_how_many_lives_it_draws_on_and_that_its_forecasts_mis
         series = of.pooled(under)
         tracked = advance("particle", series, None, len(CYCLES))
         tracked = replace(tracked, back_cast=replace(tracked.back_cast, misses=np.array(misses)))
-        said.append(predict("particle", series, tracked, CYCLES[-1], 0.5, tests=of.tests))
+        said.append(as_answered(predict("particle", series, tracked, CYCLES[-1], 0.5, tests=of.tests)))
     assert [answer["ended_lives"] for answer in said] == [0, 2]
     warned = [[w["message"] for w in answer["warnings"] if w["code"] == "missed_forecasts"] for answer in said]
     assert warned[0] == []
@@ -199,7 +200,7 @@ def test_coefficients_are_those_of_eq_6_and_say_how_probable_it_is(follows: bool
         scale=Scale(origin=0.0),
         assumptions=Assumptions(),
     )
-    item = track_item(QUANTITIES[MEAN_COF], series, posterior)
+    item = as_answered(track_item(QUANTITIES[MEAN_COF], series, posterior))
     assert (item["eq6_probability"] > 0.5) is follows
     if item["coefficients"] is None:
         assert item["eq6_probability"] == 0.0

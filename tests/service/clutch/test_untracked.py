@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
+from service.api.life import ModelName
 from service.clutch.assumptions import Assumptions, ModelInForce
 from service.clutch.model_correction import corrected_cofs
 from service.clutch.timeline import Event, Life
@@ -240,7 +241,7 @@ def test_a_model_that_corrects_for_the_oil_has_its_mean_cof_tracked(effects: lis
     warm = Event(run_id="warm", kind="stationary_stribeck", cofs=level, **at_first)
     cold = replace(warm, run_id="cold", cycles=1000.0, oil_temperature=313.0)
     tested_life = Life(origin=0.0, events=(warm, cold))
-    under = Assumptions(model=ModelInForce(name={"name": "extended", "effects": effects}))
+    under = Assumptions(model=ModelInForce(name=ModelName(name="extended", effects=effects)))
     assert len(tested_life.pooled(under).measurements) == measured
     # Stribeck parameters are those of the baseline's fits: nothing corrects them
     parameter = tested_life.series(under, "static_torque_nm", 5e5, [(20.0, 0.1), (22.0, 0.1)])

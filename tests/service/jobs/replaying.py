@@ -13,8 +13,8 @@ from service.changes.ingest_run import ingest
 from service.changes.replay import clutch_ids, replay
 from service.jobs.executor import Executor, Item, Outcome, Result, called
 from service.runs.json_run import read_run
-from service.web.responses import to_json
 from storage import jobs
+from storage.encoding import to_text
 from storage.engine.database import Database
 from storage.tables import filter_state, fit, prediction
 from storage.transfer import digest
@@ -59,7 +59,7 @@ def stock(database: Database, clutches: int = CLUTCHES, tests: int = 2) -> dict[
         register(database, ClutchIn(clutch_id=f"c{number}"), created_at=AT)
         for each in range(tests):
             sent = stationary(1000 * each + number, run_id=f"r{each}", pressures=(5.0,))
-            ingest(database, f"c{number}", read_run(to_json(sent)), received_at=AT)
+            ingest(database, f"c{number}", read_run(to_text(sent).encode()), received_at=AT)
     assert all(replayed.error is None for replayed in replay(database, clutch_ids(database), InThread()))
     return stored(database)
 

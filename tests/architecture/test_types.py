@@ -1,0 +1,45 @@
+"""What goes from layer to layer has a type: no signature in the service but the repository's takes or gives a dict of
+anything."""
+
+import ast
+from collections.abc import Iterator
+
+from tests.architecture.source import Module, by_name, none_of
+
+#: What reads the wire as it comes, with no library of the service: the command line and its client. And the rows <-> values.
+APART = ("service/cli/", "service/client/", "service/repository.py")
+#: Files that wait yet: those of the diagnosis' report, and what readers find in files. The list only shrinks.
+WAITING = frozenset(
+    {
+        "service/clutch/diagnosis/campaign.py",
+        "service/clutch/diagnosis/report.py",
+        "service/readers/hdf5.py",
+        "service/readers/parquet.py",
+        "service/readers/preview.py",
+        "service/readers/read_file.py",
+    }
+)
+
+
+def untyped(module: Module) -> Iterator[str]:
+    """Where an argument, a result or a field is a dict of anything."""
+    for node in ast.walk(module.tree):
+        annotations: list[ast.expr | None] = []
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            given = node.args
+            arguments = [*given.posonlyargs, *given.args, *given.kwonlyargs, given.vararg, given.kwarg]
+            annotations = [node.returns, *(each.annotation for each in arguments if each is not None)]
+        if isinstance(node, ast.ClassDef):
+            annotations = [field.annotation for field in node.body if isinstance(field, ast.AnnAssign)]
+        if any("dict[str, Any]" in ast.unparse(each) for each in annotations if each is not None):
+            yield f"{module.shown}:{node.lineno} {node.name}"  # type: ignore[attr-defined]
+
+
+def test_no_signature_of_the_service_is_a_dict_of_anything() -> None:
+    modules = [each for each in by_name().values() if each.shown.startswith("service/")]
+    found = {each.shown: list(untyped(each)) for each in modules if not each.shown.startswith(APART)}
+    wrong = [place for shown, places in found.items() if shown not in WAITING for place in places]
+    none_of(wrong, "signatures with dict[str, Any]:")
+    none_of(
+        sorted(shown for shown in WAITING if not found.get(shown)), "files that no longer wait: take them off WAITING"
+    )
