@@ -19,6 +19,7 @@ from typing import Any
 import httpx2
 import pytest
 
+from service.alarms.outbox import CLOCK_SECONDS
 from service.api.base import MAX_POINTS
 from service.web.limits import TAKEN_SECONDS
 from tests.benchmarks.memory import processor_seconds, resident
@@ -224,14 +225,15 @@ def clocked(path: Path, offset: str) -> Iterator[tuple[Server, Path]]:
 
 
 @pytest.mark.parametrize("offset", ["+1d", "-10d"])
-def test_a_clock_that_is_set_right_delays_no_alarm_and_drops_none(tmp_path: Path, offset: str) -> None:
-    """One that was a day ahead delayed an alarm by a day; one that was ten days behind had it given up."""
+def test_a_clock_that_is_set_right_delays_no_alarm_drops_none_and_makes_none(tmp_path: Path, offset: str) -> None:
+    """One that was a day ahead delayed an alarm by a day; one that was ten days behind had it given up, and rigs silent."""
     with receiving() as receiver, clocked(tmp_path / "a.db", offset) as (server, clock):
         receiver.status = 500
         http = server.http
         assert http.post("/v1/webhooks", json={"url": receiver.url, "secret": SECRET}).status_code == 201
         assert http.post("/v1/clutches", json={"clutch_id": "c1"}).status_code == 201
-        assert http.post("/v1/alarms", json={"quantity": "remaining_cycles", "below": 1e9}).status_code == 201
+        for rule in ({"quantity": "remaining_cycles", "below": 1e9}, {"quantity": "silent_hours", "above": 12}):
+            assert http.post("/v1/alarms", json=rule).status_code == 201
         post_tests(http, 0.0, 1000.0, 2000.0, 3000.0, 4000.0)
         receiver.await_requests(2)
         new = clock.with_name("clock-set")
@@ -247,3 +249,5 @@ def test_a_clock_that_is_set_right_delays_no_alarm_and_drops_none(tmp_path: Path
 
         until(lambda: states() == {"delivered"}, within=60)
         assert {json.loads(body)["type"] for _, _, body in receiver.requests} == {"alarm.raised"}
+        time.sleep(2 * CLOCK_SECONDS)  # the time in which rigs are judged silent
+        assert [event["quantity"] for event in http.get("/v1/alarms/events").json()["items"]] == ["remaining_cycles"]
