@@ -151,7 +151,7 @@ def _change_event(connection: Connection, event_id: str, **columns: str | None) 
 
 
 def last_heard(connection: Connection, clutch_ids: Collection[str]) -> dict[str, str]:
-    """clutch_id -> when its last run arrived, of those of these clutches that have one."""
-    last = select(run.c.clutch_id, func.max(run.c.received_at)).where(among(run.c.clutch_id, sorted(clutch_ids)))
-    rows = connection.execute(last.group_by(run.c.clutch_id))
-    return {row.clutch_id: row[1] for row in rows}
+    """clutch_id -> when its last run arrived, by the clock of then, of those of these clutches that have one."""
+    last = select(func.max(run.c.run_key)).where(among(run.c.clutch_id, sorted(clutch_ids))).group_by(run.c.clutch_id)
+    rows = connection.execute(select(run.c.clutch_id, run.c.received_at).where(run.c.run_key.in_(last)))
+    return {row.clutch_id: row.received_at for row in rows}

@@ -1,7 +1,8 @@
 """The table of jobs: waiting, running, finished, failed or cancelled. Lists begin with the newest.
 
-A job is claimed by a process, which holds it for a while and prolongs that while it works (a lease). A job whose lease has
-run out may be claimed again: its process was killed. On PostgreSQL rows that another claim has just locked are passed over;
+A job is claimed by a process, which counts up that it holds the job while it works (a lease). Whoever has seen no such
+renewal for a while, by a clock of its own, may claim the job again: its process was killed. No moment is stored, so it does
+not matter when anybody's wall clock is set. On PostgreSQL rows that another claim has just locked are passed over;
 on SQLite one process writes at a time anyway.
 """
 
@@ -10,7 +11,7 @@ from dataclasses import dataclass
 
 from sqlalchemy import ColumnElement, Connection, and_, exists, func, or_, select, update
 
-from storage.dialects import among, newest_first, now_in_seconds
+from storage.dialects import among, newest_first
 from storage.encoding import Json, Rows, to_text
 from storage.tables import OPEN_ONLY, job
 
@@ -46,6 +47,14 @@ class JobRow:
     def of(self) -> str | None:
         """What the job is of: a clutch, or the key of a kind of clutches; None: of all."""
         return self.clutch_id or self.arguments.get("fleet")
+
+
+@dataclass(frozen=True, slots=True)
+class Hold:
+    """That a job runs, after so many claims and renewals of all: the same as long as its process has not renewed it."""
+
+    job_id: str
+    renewals: int
 
 
 _rows = Rows(JobRow, key="job_key")
@@ -98,21 +107,30 @@ def open_of(connection: Connection, kind: str) -> list[JobRow]:
     return _rows.all(connection.execute(query))
 
 
-def _free(kinds: Collection[str]) -> ColumnElement[bool]:
-    """Whether a job of these kinds waits, or its lease has run out."""
-    return and_(OPEN_ONLY, job.c.kind.in_(kinds), or_(job.c.state == WAITING, job.c.leased_until < now_in_seconds()))
+def holds(connection: Connection, kinds: Collection[str]) -> list[Hold]:
+    """The holds of the jobs of these kinds that run."""
+    query = select(job.c.job_id, job.c.renewals).where(OPEN_ONLY, job.c.kind.in_(kinds), job.c.state == RUNNING)
+    return [Hold(*row) for row in connection.execute(query)]
 
 
-def any_free(connection: Connection, kinds: Collection[str]) -> bool:
-    return bool(connection.execute(select(exists(select(job.c.job_key).where(_free(kinds))))).scalar_one())
+def _free(kinds: Collection[str], abandoned: Collection[Hold]) -> ColumnElement[bool]:
+    """Whether a job of these kinds waits, or is held no other than by one of these."""
+    held = [and_(job.c.job_id == hold.job_id, job.c.renewals == hold.renewals) for hold in abandoned]
+    return and_(OPEN_ONLY, job.c.kind.in_(kinds), or_(job.c.state == WAITING, *held))
 
 
-def claim(connection: Connection, claimer: str, kinds: Collection[str], *, lease: float, at: str) -> JobRow | None:
-    """The job of these kinds whose turn it is, the claimer's for `lease` [s] from now on; None where none is free."""
-    job_id: str | None = connection.execute(_next.where(_free(kinds))).scalar()
+def any_free(connection: Connection, kinds: Collection[str], abandoned: Collection[Hold] = ()) -> bool:
+    return bool(connection.execute(select(exists(select(job.c.job_key).where(_free(kinds, abandoned))))).scalar_one())
+
+
+def claim(
+    connection: Connection, claimer: str, kinds: Collection[str], *, at: str, abandoned: Collection[Hold] = ()
+) -> JobRow | None:
+    """The job of these kinds whose turn it is, the claimer's from now on; None where none is free."""
+    job_id: str | None = connection.execute(_next.where(_free(kinds, abandoned))).scalar()
     if job_id is None:
         return None
-    claimed = {"state": RUNNING, "claimed_by": claimer, "leased_until": now_in_seconds() + lease, "started_at": at}
+    claimed = {"state": RUNNING, "claimed_by": claimer, "renewals": job.c.renewals + 1, "started_at": at}
     this = update(job).where(job.c.job_id == job_id)
     connection.execute(this.values(attempts=job.c.attempts + 1, progress=None, **claimed))
     return get(connection, job_id)
@@ -122,21 +140,21 @@ def _claimed(job_id: str, claimer: str) -> ColumnElement[bool]:
     return and_(job.c.job_id == job_id, job.c.state == RUNNING, job.c.claimed_by == claimer)
 
 
-def renew(connection: Connection, job_id: str, claimer: str, *, lease: float, progress: Json | None) -> bool:
-    """Hold the job for `lease` [s] more; False where it is no longer the claimer's: cancelled, or claimed by another."""
-    held = {"leased_until": now_in_seconds() + lease} | _rows.columns(progress=progress)
+def renew(connection: Connection, job_id: str, claimer: str, *, progress: Json | None) -> bool:
+    """Go on to hold the job; False where it is no longer the claimer's: cancelled, or claimed by another."""
+    held = {"renewals": job.c.renewals + 1} | _rows.columns(progress=progress)
     return connection.execute(update(job).where(_claimed(job_id, claimer)).values(held)).rowcount == 1
 
 
 def release(connection: Connection, job_id: str, claimer: str) -> None:
     """Give the claimer's job back; that it was begun does not count."""
-    waiting = {"state": WAITING, "attempts": job.c.attempts - 1, "claimed_by": None, "leased_until": None}
+    waiting = {"state": WAITING, "attempts": job.c.attempts - 1, "claimed_by": None}
     connection.execute(update(job).where(_claimed(job_id, claimer)).values(waiting))
 
 
 def release_all(connection: Connection) -> None:
-    """Let all leases end: no process runs that could hold one."""
-    connection.execute(update(job).where(job.c.state == RUNNING).values(leased_until=0.0))
+    """Let all jobs wait: no process runs that could hold one."""
+    connection.execute(update(job).where(job.c.state == RUNNING).values(state=WAITING, claimed_by=None))
 
 
 def set_arguments(connection: Connection, job_id: str, arguments: Json) -> None:
@@ -157,7 +175,7 @@ def end(
 
     `progress` None: how far it had come stays as it is stored.
     """
-    ended: dict[str, object] = {"state": state, "finished_at": at, "problem": problem, "leased_until": None}
+    ended: dict[str, object] = {"state": state, "finished_at": at, "problem": problem}
     if progress is not None:
         ended["progress"] = to_text(progress)
     this = (job.c.job_id == job_id) & OPEN_ONLY if claimer is None else _claimed(job_id, claimer)

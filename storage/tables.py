@@ -186,8 +186,8 @@ diagnosis = Table(
 )
 
 #: What is asked for and computed by a service when its turn comes. `clutch_id` null: of no single clutch. `arguments` is
-#: what the kind of job needs (JSON). While it runs it is `claimed_by`'s until `leased_until` (seconds by the database's
-#: clock), which that process moves on; `attempts` counts the claims. `progress` is how far it has come (JSON).
+#: what the kind of job needs (JSON). While it runs it is `claimed_by`'s, which counts `renewals` up as long as it works;
+#: `attempts` counts the claims. `progress` is how far it has come (JSON).
 job = Table(
     "job",
     metadata,
@@ -197,8 +197,8 @@ job = Table(
     *_required(TEXT, "state", "asked_at", "asked_by", "arguments"),
     Column("attempts", WHOLE, nullable=False),
     Column("claimed_by", TEXT),
-    Column("leased_until", NUMBER),
     *_optional(TEXT, "started_at", "finished_at", "progress", "problem"),
+    Column("renewals", WHOLE, nullable=False, server_default=text("0")),
     UniqueConstraint("job_id", name="job_once"),
     Index("job_open", "job_key", sqlite_where=OPEN_ONLY, postgresql_where=OPEN_ONLY),
     Index("job_of_clutch", "clutch_id", "started_at"),

@@ -1,22 +1,43 @@
-"""How work grows with the size of what it is given: time as a ratio between two sizes, memory beside the size itself."""
+"""How work grows with the size of what it is given: time beside that of as much in small parts, memory beside the size."""
 
+import gc
 import time
 import tracemalloc
 from collections.abc import Callable
 
-#: Ratio of times between sizes n and 4 n that still is linear work: 4, and as much again for a busy machine; squares are 16.
-LINEAR = 9
+#: How far apart the two sizes are that are compared.
+APART = 16
+#: Most that the ratio of times may be: linear work has 1, squares have 16, and this is as far from both.
+LINEAR = APART**0.5
+#: Trials of which the fastest counts; a machine that is busy during one of them is not during all.
+TRIALS = 5
 
 
-def time_ratio(work: Callable[[int], object], small: int, *, repeats: int = 20) -> float:
-    """Time of the processor for the work of size 4 · small over that of size small, the least of some trials each."""
-    least = [min(_seconds(work, size, repeats) for _ in range(3)) for size in (small, 4 * small)]
-    return least[1] / least[0]
+def time_ratio(work: Callable[[int], object], small: int, *, repeats: int = 1) -> float:
+    """Time of the processor for the work of size 16 · small over that for 16 times the work of size small.
+
+    Both take about as long where the work is linear, are measured by turns, and no garbage is collected meanwhile: what else
+    the machine does meets both alike. The least of each counts; further trials are made only while the ratio is too large.
+    """
+    collecting = gc.isenabled()
+    gc.disable()
+    try:
+        least = [float("inf"), float("inf")]
+        for _ in range(TRIALS):
+            for number, (size, times) in enumerate(((small, APART * repeats), (APART * small, repeats))):
+                gc.collect()
+                least[number] = min(least[number], _seconds(work, size, times))
+            if least[1] < LINEAR * least[0]:
+                break
+        return least[1] / least[0]
+    finally:
+        if collecting:
+            gc.enable()
 
 
-def _seconds(work: Callable[[int], object], size: int, repeats: int) -> float:
+def _seconds(work: Callable[[int], object], size: int, times: int) -> float:
     begun = time.process_time()
-    for _ in range(repeats):
+    for _ in range(times):
         work(size)
     return time.process_time() - begun
 

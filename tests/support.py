@@ -96,7 +96,7 @@ def free_port() -> int:
 
 def wait_until_ready(url: str, ended: Callable[[], bool]) -> None:
     """Wait for a service that has just been started."""
-    deadline = time.monotonic() + 120
+    deadline = time.monotonic() + 300
     with httpx2.Client(base_url=url, timeout=5) as http:  # one for all: each loads the certificates again
         while time.monotonic() < deadline:
             try:
@@ -105,7 +105,7 @@ def wait_until_ready(url: str, ended: Callable[[], bool]) -> None:
             except httpx2.TransportError:
                 assert not ended(), "the service ended before it was ready"
             time.sleep(0.05)
-    raise TimeoutError("the service was not ready within 120 s")
+    raise TimeoutError("the service was not ready within 300 s")
 
 
 #: Forks services off a process that has loaded the library already, which is most of what a start takes.
@@ -294,11 +294,11 @@ def serving(
 ) -> Iterator[Server]:
     """A running service on that database, stopped at the end whatever happens."""
     server = Server(database, loaded=loaded, environment=environment)
-    server.start()
     try:
+        server.start()
         yield server
     finally:
-        if server.exit_code() is None:
+        if server.process is not None and server.exit_code() is None:
             server.stop()
 
 

@@ -15,6 +15,7 @@ both slipped is far less probable than that neither did. The judgement is a func
 their arrival nor what was held before plays a part.
 """
 
+import bisect
 import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -164,28 +165,42 @@ class _Clutch:
         return self._nearest(range(len(self.runs)), 80)
 
     @cached_property
+    def all_tests(self) -> list[int]:
+        return [i for i, run in enumerate(self.runs) if run.tests]
+
+    @cached_property
     def tests(self) -> list[int]:
         """The tests that are looked at."""
-        return self._nearest([i for i, run in enumerate(self.runs) if run.tests], 40)
+        return self._nearest(self.all_tests, 40)
+
+    @cached_property
+    def rebuilds(self) -> list[int]:
+        return [i for i, run in enumerate(self.runs) if run.rebuild]
+
+    @cached_property
+    def shifts(self) -> list[int]:
+        """The events that may have shifted the level."""
+        return [i for i, run in enumerate(self.runs) if run.shift]
 
     @cached_property
     def followed(self) -> frozenset[int]:
         """The tests that are looked at with the five right before them, by which a new level is seen."""
-        tests, known_tests = [i for i, run in enumerate(self.runs) if run.tests], set(self.tests)
-        return frozenset(i for k, i in enumerate(tests) if known_tests.issuperset(tests[max(k - 5, 0) : k + 1]))
+        tests, known_tests = self.all_tests, set(self.tests)
+        places = (bisect.bisect_left(tests, i) for i in self.tests)
+        return frozenset(tests[k] for k in places if known_tests.issuperset(tests[max(k - 5, 0) : k + 1]))
 
     @cached_property
     def compared(self) -> frozenset[int]:
         """The runs that are no farther away than the tests that are looked at: beyond these the course is only a guess."""
-        left_out = [i for i, run in enumerate(self.runs) if run.tests and i not in set(self.tests)]
+        left_out = sorted(set(self.all_tests).difference(self.tests))
         reach = self._apart(left_out).min(initial=math.inf)
         return frozenset(np.flatnonzero(self._apart(range(len(self.runs))) < reach).tolist())
 
     @cached_property
-    def never_doubted(self) -> frozenset[int]:
-        """Tests too far away to be looked at: they are as sent in every belief, and add the same to each."""
-        looked_at = self.compared.union(self.tests, self.about)
-        return frozenset(i for i, run in enumerate(self.runs) if run.tests and i not in looked_at)
+    def doubtable(self) -> list[int]:
+        """All runs but tests too far away to be looked at, which are as sent in every belief and add the same to each."""
+        far = set(self.all_tests).difference(self.compared, self.tests, self.about)
+        return sorted(set(range(len(self.runs))) - far)
 
     def _nearest(self, indices: Sequence[int], most: int) -> list[int]:
         if len(indices) <= most:
@@ -250,16 +265,15 @@ class _Weighed:
     @cached_property
     def origins(self) -> list[float]:
         """The cycles at which lives begin."""
-        return [0.0, *(self.clutch.runs[i].cycles for i in self.kept if self.clutch.runs[i].rebuild)]
+        return [0.0, *(self.clutch.runs[i].cycles for i in self._rebuilds)]
 
     @cached_property
-    def life_of(self) -> dict[int, int]:
-        """The life of every run, by its place in the history."""
-        lives, life = {}, 0
-        for i, run in enumerate(self.clutch.runs):
-            life += run.rebuild and i not in self.belief.slipped
-            lives[i] = life
-        return lives
+    def _rebuilds(self) -> list[int]:
+        return [i for i in self.clutch.rebuilds if i not in self.belief.slipped]
+
+    def life_of(self, index: int) -> int:
+        """The life of a run, by its place in the history."""
+        return bisect.bisect_right(self._rebuilds, index)
 
     @cached_property
     def fits(self) -> list[tuple[CourseFit, list[int]]]:
@@ -267,7 +281,7 @@ class _Weighed:
         fits: list[tuple[CourseFit, list[int]]] = []
         level, level_sd = math.log(criteria.COF), criteria.LOG_COF_SD
         for life in range(len(self.origins)):
-            tests_of_life = [i for i in self.clutch.tests if self.life_of[i] == life and i not in self.belief.slipped]
+            tests_of_life = [i for i in self.clutch.tests if self.life_of(i) == life and i not in self.belief.slipped]
             fit = self._fit(tests_of_life, life, level, level_sd)
             fits.append((fit, tests_of_life))
             if tests_of_life:
@@ -306,16 +320,16 @@ class _Weighed:
 
     def _shifts(self, life: int) -> FloatArray:
         """The cycles of the events of a life that may have shifted its level."""
-        runs = self.clutch.runs
-        return np.array([runs[i].cycles for i in self.kept if runs[i].shift and self.life_of[i] == life])
+        shifts = [i for i in self.clutch.shifts if i not in self.belief.slipped and self.life_of(i) == life]
+        return self.clutch.cycles[shifts]
 
     @cached_property
     def log_probability(self) -> float:
         """log probability of the belief with all runs, up to a constant of the runs."""
         total = self.base
-        for i in self.kept:
+        for i in self.clutch.doubtable:
             run = self.clutch.runs[i]
-            if i in self.clutch.never_doubted:
+            if i in self.belief.slipped:
                 continue
             total += run.sent.log_protocol
             if run.sent.log_cof is not None:
@@ -343,7 +357,7 @@ class _Weighed:
 
     def _log_level(self, test: int) -> float:
         """log prior that a new level begins with a test."""
-        return math.log(self._new_level_probability(self.life_of[test], self.clutch.runs[test].sent.cycles))
+        return math.log(self._new_level_probability(self.life_of(test), self.clutch.runs[test].sent.cycles))
 
     def _new_level_probability(self, life: int, cycles: float) -> float:
         """Prior probability that a new level begins with a test of a life at these cycles; larger where maintenance lies
@@ -363,7 +377,7 @@ class _Weighed:
 
     def log_cof(self, index: int, readings: Sequence[RunReading]) -> list[float]:
         """log density of the COF of readings of a run by the course of the others; 0 for one that shows none."""
-        run, life = self.clutch.runs[index], self.life_of[index]
+        run, life = self.clutch.runs[index], self.life_of(index)
         shown = [reading for reading in readings if reading.log_cof is not None]
         if not shown:
             return [0.0] * len(readings)
@@ -394,16 +408,16 @@ class _Weighed:
         """The cycles at which a run that mistook them was most likely made: one gap after the last of its kind, or where
         its block ends after the last run."""
         run = self.clutch.runs[index]
-        other_cycles = [self.clutch.runs[i].sent.cycles for i in self.clutch.near if i in set(self.kept) and i != index]
-        latest = max(other_cycles, default=0.0)
+        near = [i for i in self.clutch.near if i not in self.belief.slipped and i != index]
+        latest = max((self.clutch.runs[i].sent.cycles for i in near), default=0.0)
         if run.block is not None:
             return latest + run.block
         gaps = np.diff(self._of_kind(index))
         return latest + (float(gaps[-1]) if gaps.size else 0.0)
 
     def _of_kind(self, index: int) -> FloatArray:
-        kind, kept_runs = self.clutch.runs[index].kind, set(self.kept)
-        same_kind = [i for i in self.clutch.near if i in kept_runs and i != index and self.clutch.runs[i].kind == kind]
+        kind, near = self.clutch.runs[index].kind, [i for i in self.clutch.near if i not in self.belief.slipped]
+        same_kind = [i for i in near if i != index and self.clutch.runs[i].kind == kind]
         return np.unique(self.clutch.cycles[same_kind]) if same_kind else np.zeros(0)
 
     def weigh(self, index: int) -> tuple[float, float, Slip] | None:
@@ -447,7 +461,8 @@ class _Weighed:
         pressures, speeds and oil beside the others of their kind. One without others is always asked about."""
         runs = self.clutch.runs
         of_cycles = dict(zip(self.clutch.near, self.clutch.surprise(self._sets([])[0]).tolist(), strict=True))
-        compared_runs = [i for i in self.kept if i in self.clutch.compared and i in of_cycles]
+        kept = (i for i in self.clutch.near if i not in self.belief.slipped)
+        compared_runs = [i for i in kept if i in self.clutch.compared]
         surprise: dict[int, float] = {}
         for i in compared_runs:
             same_kind = [j for j in compared_runs if j != i and runs[j].kind == runs[i].kind]
@@ -458,7 +473,7 @@ class _Weighed:
             shows = [
                 i
                 for i in compared_runs
-                if i not in fitted_tests and self.life_of[i] == life and runs[i].sent.log_cof is not None
+                if i not in fitted_tests and self.life_of(i) == life and runs[i].sent.log_cof is not None
             ]
             of_tests = dict(zip(fitted_tests, (fit.misses() if fitted_tests else np.zeros(0)).tolist(), strict=True))
             of_others = dict(zip(shows, self._misses(shows, life, fit).tolist(), strict=True))

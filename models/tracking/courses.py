@@ -88,7 +88,7 @@ def basis(
 
     Accurate to 2e-16 absolute, not relative: here b is only compared with measurement noise. What grows is cut at LOG_MOST.
     """
-    scale_inverse, exponent, height = np.exp(-log_scale), np.exp(log_exponent), np.ones(())
+    scale_inverse, exponent = np.exp(-log_scale), np.exp(log_exponent)
     has_courses = bool(course.any())
     if has_courses:
         fixed = _EXPONENT[course]
@@ -104,6 +104,8 @@ def basis(
     if has_courses:
         np.minimum(power, LOG_MOST, out=power)
     np.exp(power, out=power)
+    if not has_courses:
+        return np.subtract(1.0, power, out=power)
     power *= -height
     power += height
     return power

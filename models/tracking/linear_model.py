@@ -193,7 +193,9 @@ def _in_blocks(history: History, prior: TrackPrior, points: EvaluationPoints) ->
     log_scale, log_exponent, course = points.log_scale[filled], points.log_exponent[filled], points.course[filled]
     squared = np.exp(2.0 * points.log_scatter[filled])
     proportional = np.where(FORM_PROPORTIONAL[points.form[filled]], squared, 0.0)
-    flagged, test = np.divmod(np.flatnonzero(points.outlying.T != 0.0), progress.size)
+    of_test, of_point = np.array([variance, np.ones(y.size), relative]).T, np.ones((3, filled.size))
+    of_point[1:] = squared - proportional, proportional
+    flagged, test = np.divmod(np.flatnonzero(points.outlying.T.astype(bool, copy=False)), progress.size)
     test, further = np.argsort(order)[test], (prior.outlying_size * prior.size) ** 2
     rbb, log_r = np.empty(filled.size), np.empty(filled.size)
     of_r, of_rb = np.empty((len(parts), 9, filled.size)), np.empty((len(parts), 4, filled.size))
@@ -201,9 +203,7 @@ def _in_blocks(history: History, prior: TrackPrior, points: EvaluationPoints) ->
     for start in range(0, filled.size, width):
         block = slice(start, start + width)
         of_block = slice(*np.searchsorted(flagged, [start, start + width]).tolist())
-        np.multiply(relative[:, None], proportional[block], out=r)
-        r += squared[block] - proportional[block]
-        r += variance[:, None]
+        np.matmul(of_test, of_point[:, block], out=r)
         r[test[of_block], flagged[of_block] - start] += further
         log_r[block] = -_log_product(r)
         np.divide(1.0, r, out=r)

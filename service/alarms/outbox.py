@@ -4,13 +4,14 @@ At least once: an attempt is counted before it is made, and its end stored after
 the two, it is made again.
 
 What waits, waits by this process's own clock, which nobody sets, and is given up by the number of its attempts: a wall clock
-that is set forward or back delays no alarm and drops none. A start tries what waits at once.
+that is set forward or back delays no alarm, drops none, and raises none of a silent rig. A start tries what waits at once,
+and it alone goes by the wall clock to tell for how long rigs have been silent.
 """
 
 import logging
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -19,6 +20,7 @@ from sqlalchemy import Connection
 
 from service.alarms import notify, raising
 from service.alarms.receivers import Attempt
+from service.alarms.rules import Silence
 from service.api.clutch import ClutchIn
 from service.settings import Settings
 from storage import alarms, clutches, keys, webhooks
@@ -56,6 +58,9 @@ class Outbox:
         self._planned: dict[int, tuple[tuple[int, str | None], float]] = {}
         self._clock = 0.0
         self._judged: set[tuple[str, str, str, str]] = set()
+        self._heard: dict[
+            str, tuple[str, float]
+        ] = {}  # by clutch its last run, and when it came by the monotonic clock
         self._pool = ThreadPoolExecutor(_AT_ONCE, thread_name_prefix="deliver")
         self._thread = threading.Thread(target=self._work, name="outbox", daemon=True)
 
@@ -165,24 +170,40 @@ class Outbox:
             rules = [(row, rule) for row, rule in rules if rule.quantity == raising.SILENT]
             if not rules:
                 self._judged.clear()
+                self._heard.clear()
                 return
             page = clutches.page(connection, limit=None, by_name=True)
             rows = [row for row in page if "damaged" not in row.summary]
-            heard = alarms.last_heard(connection, [row.clutch_id for row in rows])
-        now, judged = datetime.now(UTC), set()
+            silences = self._silences(alarms.last_heard(connection, [row.clutch_id for row in rows]))
+        judged = set()
         for row in rows:
-            since = heard.get(row.clutch_id)
-            if since is None:
+            silence = silences.get(row.clutch_id)
+            if silence is None:
                 continue
-            hours = (now - datetime.fromisoformat(since)).total_seconds() / _SECONDS_PER_HOUR
             record = ClutchIn.model_validate(row.record)
             for rule_row, rule in rules:
-                if hours > (rule.limit or 0.0) and raising.concerns(rule, record):
-                    judged.add((row.clutch_id, rule_row.alarm_id, rule_row.saved_at, since))
+                if silence.hours > (rule.limit or 0.0) and raising.concerns(rule, record):
+                    judged.add((row.clutch_id, rule_row.alarm_id, rule_row.saved_at, silence.since))
         for clutch_id in sorted({clutch_id for clutch_id, *_ in judged - self._judged}):
             with self._database.writing(of=clutch_id) as connection:
-                raising.evaluate(connection, clutch_id)
+                raising.evaluate(connection, clutch_id, silences[clutch_id])
         self._judged = judged
+
+    def _silences(self, heard: Mapping[str, str]) -> dict[str, Silence]:
+        """For how long clutches are silent that were heard at these moments: a run that has come since the look before has
+        come now."""
+        now, known, self._heard = time.monotonic(), self._heard, {}
+        for clutch_id, since in heard.items():
+            before = known.get(clutch_id)
+            if before is not None and before[0] != since:
+                before = since, now
+            self._heard[clutch_id] = before or (since, now - _seconds_since(since))
+        return {name: Silence(since, (now - came) / _SECONDS_PER_HOUR) for name, (since, came) in self._heard.items()}
+
+
+def _seconds_since(moment: str) -> float:
+    """By the wall clock; 0 where that has been set back behind the moment."""
+    return max(0.0, (datetime.now(UTC) - datetime.fromisoformat(moment)).total_seconds())
 
 
 def pause_after(attempts: int) -> float:

@@ -13,7 +13,7 @@ from datetime import UTC, datetime
 from sqlalchemy import Connection
 
 from service.alarms import rules
-from service.alarms.rules import ClutchFacts, Finding
+from service.alarms.rules import ClutchFacts, Finding, Silence
 from service.api.alarm import AlarmIn, EventOut
 from service.api.base import of_row
 from service.api.clutch import ClutchIn
@@ -31,8 +31,12 @@ _ENDED_LIFE = "ended_life"
 RAISED, CLEARED, TEST = "alarm.raised", "alarm.cleared", "alarm.test"
 
 
-def evaluate(connection: Connection, clutch_id: str) -> None:
-    """Raise and clear a clutch's alarms by what is stored of it now."""
+def evaluate(connection: Connection, clutch_id: str, silence: Silence | None = None) -> None:
+    """Raise and clear a clutch's alarms by what is stored of it now.
+
+    For how long its rig is silent only the outbox measures (`silence`). For all others it is so at least for as long as it
+    was when an alarm of that was raised: no wall clock raises or clears one.
+    """
     in_use, before = alarms.enabled(connection, clutch_id), alarms.open_of_clutch(connection, clutch_id)
     if not in_use and not before:
         return
@@ -42,9 +46,13 @@ def evaluate(connection: Connection, clutch_id: str) -> None:
     record, at = ClutchIn.model_validate(row.record), _now()
     clutch_rules = [] if row.archived else [(rule_row, rule_of(rule_row)) for rule_row in in_use]
     clutch_rules = [(rule_row, rule) for rule_row, rule in clutch_rules if concerns(rule, record)]
+    silences = [] if silence is None else [silence]
+    if row.silent is not None:
+        silences += [Silence(row.silent, old.content["value"]) for old in before.values() if old.quantity == SILENT]
     still_raised: set[str] = set()
     for of_silence in (True, False):  # a silent rig is a state, which other rules look at
-        facts = ClutchFacts(connection=connection, clutch=row, geometry=record.geometry.to_model(), now=at)
+        geometry = record.geometry.to_model()
+        facts = ClutchFacts(connection=connection, clutch=row, geometry=geometry, now=at, silences=silences)
         for rule_row, rule in clutch_rules:
             if (rule.quantity == SILENT) is of_silence:
                 still_raised |= _judged(rule_row, rule, facts, before.get(rule_row.alarm_id))

@@ -1,9 +1,8 @@
 """What a rule watches: one value of a clutch against a limit, or a state or verdict among some."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from datetime import datetime
 from typing import Any
 
 import numpy as np
@@ -25,19 +24,29 @@ from storage import alarms, diagnoses, results, runs
 from storage.clutches import ClutchRow
 from storage.results import FitRow
 
-_SECONDS_PER_HOUR, _SECONDS_PER_DAY = 3600.0, 86400.0
+_SECONDS_PER_DAY = 86400.0
 #: The quantile that is the safe bound.
 _SAFE = 0.05
 
 
+@dataclass(frozen=True, slots=True)
+class Silence:
+    """For how many hours at least no run has arrived since the one of that moment (`since`, ISO 8601)."""
+
+    since: str
+    hours: float
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClutchFacts:
-    """What is stored of a clutch now, as rules look at it; what few rules need is read when one does."""
+    """What is stored of a clutch now, as rules look at it; what few rules need is read when one does. `silences`: what is
+    known of its rig's, of its last run or of earlier ones."""
 
     connection: Connection
     clutch: ClutchRow
     geometry: Geometry
     now: str
+    silences: Sequence[Silence] = ()
 
     @property
     def clutch_id(self) -> str:
@@ -200,8 +209,7 @@ def _silent_hours(_rule: AlarmIn, facts: ClutchFacts) -> Finding | None:
     heard = facts.heard()
     if heard is None or facts.summary.get("status") == ENDED:
         return None
-    silence = datetime.fromisoformat(facts.now) - datetime.fromisoformat(heard)
-    hours = silence.total_seconds() / _SECONDS_PER_HOUR
+    hours = max((silence.hours for silence in facts.silences if silence.since == heard), default=0.0)
     return Finding(value=hours, words=condition.silence_in_words(heard))
 
 

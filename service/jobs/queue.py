@@ -1,7 +1,8 @@
 """Claims the jobs of the database and runs each in a process of its own.
 
 Jobs are rows (`storage.jobs`), so any service on the database does them: who is free claims the next one and prolongs its
-lease while it works. The job of a service that was killed is claimed by another once the lease has run out; one that was
+lease while it works. The job of a service that was killed is claimed by another which has seen no prolongation for as long
+as a lease, by its own monotonic clock: a wall clock that is set takes no job from who works, and holds up none. One that was
 cancelled, wherever that was asked for, is ended at the next prolongation. How a kind of job is done, and how its end is
 stored, is a `JobKind`.
 """
@@ -25,7 +26,7 @@ from storage import jobs
 from storage.encoding import Json
 from storage.engine.database import Database
 from storage.engine.errors import StorageError
-from storage.jobs import JobRow
+from storage.jobs import Hold, JobRow
 
 #: Seconds by the clock that a diagnosis may take for each second of processor time that it may: it runs on idle processors
 #: only, beside a full load for many times as long as alone. Chosen; no table. It ends a diagnosis that waits for ever.
@@ -92,6 +93,20 @@ _LOOK = 0.2
 _log = logging.getLogger("clutchlife")
 
 
+class Leases:
+    """Since when jobs are held as they are, as one thread has seen it."""
+
+    def __init__(self, seconds: float) -> None:
+        self._seconds = seconds
+        self._since: dict[Hold, float] = {}
+
+    def ended(self, holds: Sequence[Hold]) -> list[Hold]:
+        """Those of all present holds that were not renewed for so many seconds."""
+        now = time.monotonic()
+        self._since = {hold: self._since.get(hold, now) for hold in holds}
+        return [hold for hold, since in self._since.items() if now - since >= self._seconds]
+
+
 class JobQueue:
     """The threads that do jobs. `start` it once the database is open, `close` it before that is closed."""
 
@@ -138,14 +153,14 @@ class JobQueue:
 
     def _work(self, group: Mapping[str, JobKind]) -> None:
         """Do the jobs of a group one after the other; where none is free, wait until the queue is woken, or for a pause."""
-        seen = 0
+        seen, leases = 0, Leases(self._lease)
 
         def woken() -> bool:
             return self._wakes != seen or self._closing
 
         while not self._closing:
             try:
-                job = self._claimed(group)
+                job = self._claimed(group, leases)
                 if job is not None:
                     self._do(job, group[job.kind])
                     continue
@@ -155,15 +170,16 @@ class JobQueue:
                 self._change.wait_for(woken, self._pause)
                 seen = self._wakes
 
-    def _claimed(self, group: Mapping[str, JobKind]) -> JobRow | None:
+    def _claimed(self, group: Mapping[str, JobKind], leases: Leases) -> JobRow | None:
         """The next job of a group, claimed; None where there is none, or the database is away for a while."""
         try:
             with self._database.reading() as connection:
-                free = jobs.any_free(connection, group)
+                ended = leases.ended(jobs.holds(connection, group))
+                free = jobs.any_free(connection, group, ended)
             if not free:
                 return None
             with self._database.writing(of=self._name) as connection:
-                claimed = jobs.claim(connection, self._name, group, lease=self._lease, at=_now())
+                claimed = jobs.claim(connection, self._name, group, at=_now(), abandoned=ended)
         except StorageError as error:
             if not self._away:
                 _log.warning("jobs wait for the database: %s", error)
@@ -259,7 +275,7 @@ class JobQueue:
     def _renewed(self, job: JobRow, progress: Json | None) -> bool:
         try:
             with self._database.writing(of=self._name) as connection:
-                return jobs.renew(connection, job.job_id, self._name, lease=self._lease, progress=progress)
+                return jobs.renew(connection, job.job_id, self._name, progress=progress)
         except StorageError as error:
             _log.warning("job %s: the lease could not be prolonged: %s", job.job_id, error)
             return True

@@ -42,10 +42,10 @@ def held_alone(pid: int) -> int:
     return 1024 * sum(int(line.split()[1]) for line in rollup.splitlines() if line.startswith("Pss:"))
 
 
-def processor_seconds(pid: int) -> float:
-    """Time of the processor that a process has taken, and the children that it has waited for."""
+def processor_seconds(pid: int, *, waited: bool = True) -> float:
+    """Time of the processor that a process has taken and, where these count, the children that it has waited for."""
     fields = Path(f"/proc/{pid}/stat").read_text(encoding="ascii").rpartition(")")[2].split()
-    return sum(map(int, fields[11:15])) / os.sysconf("SC_CLK_TCK")
+    return sum(map(int, fields[11 : 15 if waited else 13])) / os.sysconf("SC_CLK_TCK")
 
 
 def family_seconds(pid: int) -> float:

@@ -1,6 +1,7 @@
 """Jobs in either kind of database: whose turn it is, and whose a job is."""
 
 import threading
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 
@@ -10,7 +11,7 @@ from sqlalchemy import Connection
 from storage import clutches, jobs
 from storage.engine.database import Database
 from storage.engine.opening import open_database
-from storage.jobs import CANCELLED, FAILED, FINISHED, RUNNING, WAITING, JobRow
+from storage.jobs import CANCELLED, FAILED, FINISHED, RUNNING, WAITING, Hold, JobRow
 from tests.storage.samples import CLUTCH, clutch_row
 
 AT = "2026-11-02T10:00:0{}+00:00"
@@ -39,8 +40,8 @@ def connection(connection: Connection) -> Connection:
     return connection
 
 
-def claimed(connection: Connection, claimer: str, second: int = 1, lease: float = 60.0) -> JobRow:
-    return jobs.claim(connection, claimer, ["diagnosis"], lease=lease, at=AT.format(second))
+def claimed(connection: Connection, claimer: str, second: int = 1, abandoned: Sequence[Hold] = ()) -> JobRow:
+    return jobs.claim(connection, claimer, ["diagnosis"], at=AT.format(second), abandoned=abandoned)
 
 
 def test_a_clutch_with_many_jobs_does_not_hold_up_another(connection: Connection) -> None:
@@ -50,7 +51,7 @@ def test_a_clutch_with_many_jobs_does_not_hold_up_another(connection: Connection
         order.append(row.job_id)
         assert jobs.end(connection, row.job_id, FINISHED, AT.format(second), claimer="one")
     assert order == ["j0", "j3", "j1", "j2"]
-    assert jobs.claim(connection, "one", ["diagnosis"], lease=60.0, at=AT.format(1)) is None
+    assert jobs.claim(connection, "one", ["diagnosis"], at=AT.format(1)) is None
 
 
 def test_a_clutch_that_keeps_asking_is_served_in_turn(connection: Connection) -> None:
@@ -68,8 +69,8 @@ def test_a_job_is_the_claimer_s_alone_until_it_ends(connection: Connection) -> N
     row = claimed(connection, "one")
     assert (row.job_id, row.state, row.attempts, row.claimed_by) == ("j0", RUNNING, 1, "one")
     assert row.arguments == {"number": 0}
-    assert not jobs.renew(connection, "j0", "two", lease=60.0, progress=None)
-    assert jobs.renew(connection, "j0", "one", lease=60.0, progress={"step": "reads"})
+    assert not jobs.renew(connection, "j0", "two", progress=None)
+    assert jobs.renew(connection, "j0", "one", progress={"step": "reads"})
     assert not jobs.end(connection, "j0", FINISHED, AT.format(2), claimer="two")
     assert jobs.end(connection, "j0", FAILED, AT.format(2), problem="it broke", claimer="one")
     assert not jobs.end(connection, "j0", CANCELLED, AT.format(3))
@@ -78,13 +79,21 @@ def test_a_job_is_the_claimer_s_alone_until_it_ends(connection: Connection) -> N
     assert ended.finished_at == AT.format(2)
 
 
-def test_a_job_whose_lease_has_run_out_is_claimed_again(connection: Connection) -> None:
-    claimed(connection, "one", lease=-1.0)
-    second = claimed(connection, "two", second=2)
+def test_a_job_that_was_not_renewed_is_claimed_again(connection: Connection) -> None:
+    claimed(connection, "one")
+    (left,) = before = jobs.holds(connection, ["diagnosis"])
+    assert left.job_id == "j0"
+    second = claimed(connection, "two", 2, before)
     assert (second.clutch_id, second.job_id) == ("other", "j3"), "the other clutch was not served yet"
-    third = claimed(connection, "two", second=3)
+    for name in ("j1", "j2"):
+        jobs.end(connection, name, CANCELLED, AT.format(2))
+    assert jobs.renew(connection, "j0", "one", progress=None)
+    assert not jobs.any_free(connection, ["diagnosis"], before)
+    assert claimed(connection, "two", 3, before) is None, "its process is there"
+    assert jobs.holds(connection, ["replay"]) == []
+    third = claimed(connection, "two", 3, jobs.holds(connection, ["diagnosis"])[:1])
     assert (third.job_id, third.attempts, third.claimed_by) == ("j0", 2, "two")
-    assert not jobs.renew(connection, "j0", "one", lease=60.0, progress=None)
+    assert not jobs.renew(connection, "j0", "one", progress=None)
     assert not jobs.end(connection, "j0", FINISHED, AT.format(4), claimer="one")
 
 
@@ -130,7 +139,7 @@ def test_processes_that_claim_at_once_get_a_job_each(database: Database) -> None
             together.wait()
             while True:
                 with own.writing(of=name) as connection:
-                    row = jobs.claim(connection, name, ["diagnosis"], lease=60.0, at=AT.format(1))
+                    row = jobs.claim(connection, name, ["diagnosis"], at=AT.format(1))
                 if row is not None:  # else the row that was next was taken meanwhile
                     return row.job_id
 

@@ -5,7 +5,6 @@ After each of them the service answers, the clutch is as it was, and neither the
 
 import gzip
 import http.client
-import time
 import zipfile
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -25,8 +24,6 @@ CLUTCH = "/v1/clutches/c1"
 #: A service at rest takes some 130 MB. What refusing a file may add, in it and in its readers together [bytes]: a reader
 #: of MDF4 alone takes 150 MB before it has read a byte.
 MOST_ADDED = 300 << 20
-#: No refusal may take longer [s]: the readers have 30 s, and none of these files needs a tenth of that.
-MOST_SECONDS = 20.0
 HEADER = "time_s,pressure_bar,speed_rpm,torque_nm\n"
 
 
@@ -57,14 +54,13 @@ class Watched:
 
     def refuse(self, content: bytes, *, name: str = "run.csv", status: int = 422, **query: str) -> dict[str, Any]:
         """Post what must not be taken; the problem."""
-        begun = time.monotonic()
         answer, grown = self.post(content, name=name, **query)
-        assert time.monotonic() - begun < MOST_SECONDS
         assert (answer.status_code, answer.headers["content-type"]) == (status, "application/problem+json"), answer.text
         problem: dict[str, Any] = answer.json()
         assert problem["status"] == status
         assert problem["detail"]
         assert len(problem["errors"]) <= 50
+        assert all(error["code"] != "too_slow" for error in problem["errors"]), "its reader has used up its time"
         assert grown < MOST_ADDED, f"{grown >> 20} MB"
         assert self.state() == self.before
         return problem

@@ -1,17 +1,25 @@
 """Rules and events as a script uses them: raised once, acknowledged, cleared by the hysteresis; receivers learn of it."""
 
 from collections.abc import Iterator
+from datetime import UTC, datetime, timedelta
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
 
-from service.alarms import outbox, rules
+from service.alarms import outbox, raising, rules
+from service.alarms.rules import Silence
 from service.api.alarm import AlarmIn
 from service.changes import change_alarms
+from service.settings import Settings
+from storage import alarms
+from storage.engine.database import Database
 from tests.service.alarms.receiving import SECRET, Receiver, receiving, signed_rightly
 from tests.service.clients import filled_client, post_run
 from tests.service.jobs.waiting import until
+from tests.service.web.routes.granting import context_of
+from tests.storage.samples import write_to
 from tests.support import post_tests, stationary
 
 CYCLES = (0.0, 1000.0, 2000.0, 3000.0)
@@ -219,6 +227,58 @@ def test_a_silent_rig_is_an_alarm_and_a_state(life: TestClient, monkeypatch: pyt
     assert made.status_code == 200
     assert "silent" not in life.get("/v1/clutches/e").json()["state"]["why"]
     assert [event["state"] for event in events(life)] == ["cleared"]
+
+
+def test_only_who_measures_raises_an_alarm_of_silence_and_only_a_run_ends_it(life: TestClient) -> None:
+    """Whatever was stored meanwhile compared the wall clock: set forward it raised alarms, set back it cleared them."""
+    database = context_of(life).database
+    with database.reading() as connection:
+        since = alarms.last_heard(connection, ["e"])["e"]
+    made = rule(life, quantity="silent_hours", above=48)
+    assert events(life) == []
+    for silence in (None, Silence(since, 47.9), Silence("2020-01-01T00:00:00+00:00", 1e5)):
+        write_to(database, raising.evaluate, "e", silence)
+        assert events(life) == []
+    for silence in (Silence(since, 50.0), None):
+        write_to(database, raising.evaluate, "e", silence)
+        (raised,) = events(life)
+    assert (raised["value"], raised["state"]) == (50.0, "raised")
+    for change in ({"archived": False, "reason": "none"}, {"fluid": "x"}):
+        life.patch("/v1/clutches/e", json=change)
+    assert events(life) == [raised]
+    address, body = f"/v1/alarms/{made['alarm_id']}", {"clutch_id": "e", "quantity": "silent_hours", "hysteresis": 0.0}
+    for limit, state in ((49, "raised"), (51, "cleared")):
+        assert life.put(address, json=body | {"above": limit}).status_code == 200
+        assert [event["state"] for event in events(life)] == [state]
+    write_to(database, raising.evaluate, "e", Silence(since, 52.0))
+    assert [event["state"] for event in events(life)] == ["raised", "cleared"]
+    post_run(life, stationary(4000.0), "e")
+    write_to(database, raising.evaluate, "e", Silence(since, 53.0))
+    assert [event["state"] for event in events(life)] == ["cleared", "cleared"]
+
+
+def test_a_wall_clock_that_is_set_makes_no_rig_silent_nor_hides_one(
+    database: Database, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    wall, passed = datetime(2026, 11, 2, 10, tzinfo=UTC), 1000.0
+    box, stamps = outbox.Outbox(database, Settings()), {"a": wall.isoformat(), "b": wall.isoformat()}
+    monkeypatch.setattr(outbox, "datetime", SimpleNamespace(now=lambda _: wall, fromisoformat=datetime.fromisoformat))
+    monkeypatch.setattr(outbox, "time", SimpleNamespace(monotonic=lambda: passed))
+
+    def hours() -> dict[str, float]:
+        return {name: round(silence.hours, 6) for name, silence in box._silences(stamps).items()}
+
+    wall += timedelta(hours=2)
+    assert hours() == {"a": 2.0, "b": 2.0}, "what a start finds"
+    for days in (10, -20):
+        wall += timedelta(days=days)
+        passed += 3600.0
+        stamps["b"] = wall.isoformat()
+        assert hours() == {"a": 3.0 if days > 0 else 4.0, "b": 0.0}
+    stamps["c"] = (wall + timedelta(days=3)).isoformat()
+    assert hours() == {"a": 4.0, "b": 0.0, "c": 0.0}
+    passed += 3600.0
+    assert hours() == {"a": 5.0, "b": 1.0, "c": 1.0}
 
 
 def test_a_kind_is_watched_as_a_whole_and_an_archived_clutch_is_not(client: TestClient) -> None:

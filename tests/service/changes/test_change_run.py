@@ -239,7 +239,7 @@ def test_a_diagnosis_of_what_was_changed_meanwhile_is_stale_and_not_adopted(benc
         )
 
     asked_for, _ = ask()
-    job = write_to(bench.database, jobs.claim, "one", [jobs.DIAGNOSIS], lease=60.0, at=AT)
+    job = write_to(bench.database, jobs.claim, "one", [jobs.DIAGNOSIS], at=AT)
     bench.send(body("test", "odd", 1500.0, odd=True))  # held: the runs are the same
     assert ask() == (asked_for, False)
     apart, new = ask(isolability=True)  # the one that runs does not say it

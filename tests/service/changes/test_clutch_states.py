@@ -64,7 +64,7 @@ class Written:
         """A diagnosis that was asked for before the writes to come, or now, and ends now."""
         database = self.bench.database
         run_diagnosis.ask(database, CLUTCH, by="local", adopt=False, request="", most=1, created_at=AT)
-        job = write_to(database, jobs.claim, "one", [jobs.DIAGNOSIS], lease=60.0, at=AT)
+        job = write_to(database, jobs.claim, "one", [jobs.DIAGNOSIS], at=AT)
         assert job is not None
         report = {"verdict": self.one_of(VERDICTS), "causes": []}
         ended = {"report": report, "extension": EXTENSION}

@@ -145,11 +145,12 @@ def test_a_diagnosis_that_is_no_longer_the_claimer_s_is_not_adopted(bench: Bench
     diagnosis_id, _ = ask(database, CLUTCH, by="local", adopt=False, request="", most=1, created_at=AT)
     before = stored(database)
     with database.writing() as connection:
-        assert jobs.claim(connection, "one", [jobs.DIAGNOSIS], lease=-1.0, at=AT) is not None
+        assert jobs.claim(connection, "one", [jobs.DIAGNOSIS], at=AT) is not None
         if meanwhile == "cancelled":
             assert jobs.end(connection, diagnosis_id, jobs.CANCELLED, AT)
         else:
-            assert jobs.claim(connection, "two", [jobs.DIAGNOSIS], lease=60.0, at=AT) is not None
+            left = jobs.holds(connection, [jobs.DIAGNOSIS])
+            assert jobs.claim(connection, "two", [jobs.DIAGNOSIS], at=AT, abandoned=left) is not None
     ended = {"report": REPORT, "extension": EXTENSION}
     assert not finish_and_adopt(database, CLUTCH, diagnosis_id, ended, at=AT, claimer="one")
     with database.reading() as connection:

@@ -172,7 +172,7 @@ def test_an_end_has_its_own_kind_learn_and_goes_before_the_rest_of_another(
         ingest(in_file, clutch_id, read_run(to_text(end).encode()), received_at=AT)
 
     def do_next() -> tuple[dict[str, int], dict[str, str]]:
-        job = write_to(in_file, jobs.claim, "here", [jobs.FLEET_REFRESH], lease=60.0, at=AT)
+        job = write_to(in_file, jobs.claim, "here", [jobs.FLEET_REFRESH], at=AT)
         task = ChangeTask(**work_of_change("f")(job, Settings()).task)
         done = learn_fleet.as_job(in_file, task, say=lambda _: None, executor=InThread())
         write_to(in_file, jobs.end, job.job_id, jobs.FINISHED, AT)

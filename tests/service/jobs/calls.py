@@ -111,4 +111,5 @@ def killed_always(number: int) -> int:
 
 def forever(_: int) -> None:
     """It does not end by itself."""
-    time.sleep(600)
+    while True:
+        time.sleep(600)

@@ -4,7 +4,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
@@ -98,7 +97,7 @@ def store(database, *_):
     with database.writing() as connection:
         clutches.insert(connection, clutch_row())
         print("stores", flush=True)
-        time.sleep(60)
+        time.sleep(600)
 
 replay.replay = {"computes": lambda _, names, computing: computing.map(compute, names), "stores": store}[sys.argv[1]]
 from service.cli.main import app
@@ -118,12 +117,10 @@ def test_an_interrupt_ends_a_command_in_the_middle_and_leaves_nothing_half_done(
     ) as replay:
         try:
             assert replay.stdout.readline().strip() == at
-            began = time.monotonic()
             replay.send_signal(signal.SIGINT)
-            said = replay.communicate(timeout=30)[1]
+            said = replay.communicate(timeout=60)[1]
         finally:
             replay.kill()
-    assert time.monotonic() - began < 5  # [s] a second, beside other work; the store would take a minute
     assert replay.returncode in {1, 130}, said
     assert "Traceback" not in said
     with closing(open_database(url, lock_timeout=0.05)) as database, database.writing() as connection:

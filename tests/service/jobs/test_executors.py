@@ -7,7 +7,6 @@ import signal
 import subprocess
 import sys
 import threading
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -122,10 +121,8 @@ def test_closing_ends_what_runs_at_once() -> None:
     pool = executor_of("processes:2")
     outcomes = pool.map(calls.forever, range(8))
     threading.Timer(2.0, pool.close).start()
-    began = time.monotonic()
     with pytest.raises(RuntimeError, match="the executor is closed"):
         list(outcomes)
-    assert time.monotonic() - began < 30
     until(lambda: not any(child.is_alive() for child in multiprocessing.active_children()), within=30.0)
 
 

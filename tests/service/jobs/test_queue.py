@@ -4,17 +4,18 @@ import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 from service.jobs import process
 from service.jobs.process import Work
-from service.jobs.queue import JobKind, JobQueue
+from service.jobs.queue import JobKind, JobQueue, Leases
 from service.settings import DATABASE_VARIABLE, Settings
 from storage import jobs
 from storage.engine.database import Database
-from storage.jobs import JobRow
+from storage.jobs import Hold, JobRow
 from tests.service.jobs.waiting import until
 from tests.storage.samples import read_from, write_to
 
@@ -115,6 +116,39 @@ def test_a_queue_that_is_woken_looks_at_once(in_file: Database, monkeypatch: pyt
         ask(in_file, "r", jobs.REPLAY)
         queue.wake()
         until(lambda: states(in_file) == {"r": "failed"}, within=20.0)
+
+
+def test_a_lease_ends_by_a_clock_that_nobody_sets(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It ended by the wall clock: set forward, whoever worked lost the job; set back, it was held for as long."""
+    now = [100.0]
+    monkeypatch.setattr("service.jobs.queue.time", SimpleNamespace(monotonic=lambda: now[0]))
+    leases, left, renewed = Leases(30.0), Hold("left", 1), [Hold("held", number) for number in range(9)]
+    for number in range(6):
+        assert leases.ended([left, renewed[number]]) == []
+        now[0] += 5.0
+    assert leases.ended([left, renewed[6]]) == [left]
+    assert leases.ended([]) == []
+    assert leases.ended([left]) == [], "it was not there in between"
+
+
+def test_a_job_whose_process_does_not_renew_it_is_done_by_who_sees_that(in_file: Database) -> None:
+    """And one that is renewed is left alone, though both were claimed long ago by any clock."""
+    done = JobKind(lambda _job, _settings: Work(modules=("this",), task={}, longest=0.0), finish_of(in_file))
+    with started(in_file, {jobs.REPLAY: done}):
+        with in_file.writing(of="another") as connection:
+            for name in ("left", "held"):
+                new = JobRow(
+                    job_id=name, kind=jobs.REPLAY, clutch_id=None, asked_at=AT, asked_by="a", arguments={"request": ""}
+                )
+                jobs.insert(connection, new)
+                assert jobs.claim(connection, "another", [jobs.REPLAY], at="1970-01-01T00:00:00+00:00")
+
+        def look() -> bool:
+            assert write_to(in_file, jobs.renew, "held", "another", progress=None)
+            return states(in_file)["left"] == "failed"
+
+        until(look)
+        assert states(in_file)["held"] == "running"
 
 
 RARE = [pytest.param(how, marks=pytest.mark.slow) for how in ("raises", "writes garbage", "says nothing")]

@@ -61,9 +61,10 @@ async def app(_scope: Scope, _receive: Receive, send: Send) -> None:
     await send({"type": "http.response.body", "body": b"ok"})
 
 
-async def seconds_until_closed(sent: list[bytes], pause: float) -> tuple[bytes, float]:
-    """What is answered to pieces that are sent a pause apart where a head has half a second, and when the server closes."""
-    config = Config(log_config=None, app=app, http=bounded(9, 0.5), lifespan="off", timeout_keep_alive=60)
+async def until_closed(sent: list[bytes], pause: float, *, head: float) -> tuple[bytes, int, float]:
+    """What is answered to pieces that are sent a pause apart where a head has so many seconds; how many of them are left
+    when the server closes, and after how many seconds it does."""
+    config = Config(log_config=None, app=app, http=bounded(9, head), lifespan="off", timeout_keep_alive=60)
     config.load()
     state = ServerState()
     loop = asyncio.get_running_loop()
@@ -73,14 +74,14 @@ async def seconds_until_closed(sent: list[bytes], pause: float) -> tuple[bytes, 
         reader, writer = await asyncio.open_connection(*server.sockets[0].getsockname())
         begun = loop.time()
         reading = asyncio.create_task(reader.read())
-        for piece in sent:
-            writer.write(piece)
+        for left in reversed(range(len(sent))):
+            writer.write(sent[-1 - left])
             await asyncio.wait([reading], timeout=pause)
             if reading.done():
                 break
-        answered = await asyncio.wait_for(reading, 10)
+        answered = await asyncio.wait_for(reading, 50)
         writer.close()
-        return answered, loop.time() - begun
+        return answered, left, loop.time() - begun
 
 
 WHOLE = b"GET / HTTP/1.1\r\nHost: a\r\n\r\n"
@@ -107,9 +108,9 @@ CLOSED: dict[str, tuple[list[bytes], int, bytes]] = {
 @pytest.mark.parametrize("case", CLOSED)
 def test_a_connection_whose_head_is_slow_long_or_missing_is_closed(case: str) -> None:
     sent, answers, refusal = CLOSED[case]
-    answered, seconds = asyncio.run(seconds_until_closed(sent, 0.1))
+    answered, left, seconds = asyncio.run(until_closed(sent, 0.1, head=0.5))
     assert answered.count(b"HTTP/1.1 200") == answers
-    assert seconds < 4
+    assert left > 0 or len(sent) < 9, "it takes what comes, however slowly"
     if refusal:
         assert b"HTTP/1.1 " + refusal in answered
         assert b"connection: close" in answered
@@ -147,8 +148,8 @@ def test_what_one_connection_sends_before_any_key_is_asked_for_is_not_kept(tmp_p
 
 
 def test_a_connection_that_goes_on_asking_stays_open() -> None:
-    """Twelve requests over three times as long as one head may take."""
-    answered, seconds = asyncio.run(seconds_until_closed([WHOLE] * 12 + [b"GET / "], 0.12))
+    """Twelve requests over twice as long as one head may take."""
+    answered, _, seconds = asyncio.run(until_closed([WHOLE] * 12 + [b"GET / "], 0.12, head=0.7))
     assert answered.count(b"HTTP/1.1 200") == 12
     assert seconds > 1.4
 

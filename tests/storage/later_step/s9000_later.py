@@ -4,7 +4,7 @@ import sqlalchemy as sa
 from alembic import op
 
 revision = "s9000_later"
-down_revision: str | None = "s0004_checksums"
+down_revision: str | None = "s0005_leases_without_a_clock"
 
 
 def upgrade() -> None:

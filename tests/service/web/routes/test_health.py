@@ -55,12 +55,10 @@ def test_ready_at_once_while_all_threads_wait_for_the_write_lock(client: TestCli
             posts = [pool.submit(client.post, "/v1/clutches", json={"clutch_id": f"w{number}"}) for number in range(45)]
             time.sleep(1.0)
             assert not any(post.done() for post in posts), "they do not wait"
-            begun = time.monotonic()
             answer = client.get("/readyz")
-            seconds = time.monotonic() - begun
+            assert not any(post.done() for post in posts), "it waited as long as they may"
         assert {post.result().status_code for post in posts} == {201}
     assert answer.status_code == 200
-    assert seconds < 5.0
 
 
 def test_a_disk_that_hangs_is_not_ready_in_time(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:

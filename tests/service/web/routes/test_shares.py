@@ -79,7 +79,7 @@ def trickled(port: int, seconds: float) -> bytes:
 def test_a_body_that_trickles_in_ends_with_408_and_the_connection(tmp_path: Path) -> None:
     limits = {"CLUTCHLIFE_BODY_SECONDS": "1"}
     with serving(tmp_path / "a.db", loaded=True, environment=limits) as server:
-        head, _, body = trickled(server.port, 8).partition(b"\r\n\r\n")
+        head, _, body = trickled(server.port, 60).partition(b"\r\n\r\n")
     assert head.startswith(b"HTTP/1.1 408")
     assert b"connection: close" in head.lower()
     assert b"urn:clutchlife:problem:too-slow" in body

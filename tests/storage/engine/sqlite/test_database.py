@@ -4,8 +4,8 @@ import multiprocessing
 import os
 import sqlite3
 import stat
-import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from pathlib import Path
 from types import SimpleNamespace
@@ -247,9 +247,7 @@ def test_ready_writes_nothing_and_waits_for_nobody(database: Database) -> None:
         assert not database.faults(least_free=LEAST_FREE)
     assert files() == before
     with database.writing():
-        begun = time.monotonic()
         assert not database.faults(least_free=LEAST_FREE), "who writes now can write"
-        assert time.monotonic() - begun < 5.0
 
 
 def _hold(path: str, begin: str, say: "multiprocessing.connection.Connection") -> None:
@@ -262,16 +260,16 @@ def _hold(path: str, begin: str, say: "multiprocessing.connection.Connection") -
 @pytest.mark.parametrize("begin", one_quick(["BEGIN EXCLUSIVE", "BEGIN IMMEDIATE"]))
 def test_ready_at_once_while_another_process_holds_the_lock(tmp_path: Path, journal_mode: str, begin: str) -> None:
     spawn = multiprocessing.get_context("spawn")
-    with closing(open_database(f"sqlite:///{tmp_path}/a.db")) as database:
+    with closing(open_database(f"sqlite:///{tmp_path}/a.db", lock_timeout=600.0)) as database:
         assert database.journal_mode == journal_mode
         ours, theirs = spawn.Pipe()
         other = spawn.Process(target=_hold, args=(str(database.path), begin, theirs))
         other.start()
         assert ours.poll(60)
         assert ours.recv() == "held"
-        begun = time.monotonic()
-        assert database.faults(least_free=LEAST_FREE) == {}
-        assert time.monotonic() - begun < 5.0
+        with ThreadPoolExecutor(1) as pool:
+            looking = pool.submit(database.faults, least_free=LEAST_FREE)
+            assert looking.result(timeout=60) == {}
         ours.send("end")
         other.join(60)
 
