@@ -166,7 +166,7 @@ class Outbox:
             if not rules:
                 self._judged.clear()
                 return
-            page = clutches.page(connection, limit=None, by_name=True)
+            page = clutches.page(connection, limit=None)
             rows = [row for row in page if "damaged" not in row.summary]
             heard = alarms.last_heard(connection, [row.clutch_id for row in rows])
         now, judged = datetime.now(UTC), set()

@@ -7,6 +7,7 @@ from pydantic import BeforeValidator, Field, model_validator
 from models.clutch import Geometry
 from models.degradation.severity import Severity, SeverityBasis
 from service.api import base, life
+from service.api.alarm import EventOut
 from service.channels import whole
 
 #: 2.0 is the whole number 2.
@@ -245,11 +246,12 @@ class ClutchOut(base.Answer):
     action: str = Field(description="One sentence: what to do now")
     runs: int = Field(description="Number of runs that count, without held and withdrawn ones")
     held: int = Field(description="Number of held runs, which wait to be confirmed, corrected or withdrawn")
+    alarms: list[EventOut] = Field(description="Its alarms that nobody has acknowledged, newest first")
     summary: ClutchSummary | None = Field(description="Health and remaining life; null before the first run")
     recent: Recent | None = Field(description="The recent history; null before the first run")
     diagnosis: LatestDiagnosis | None = Field(description="The newest finished diagnosis; null without one")
 
 
 ClutchPage = base.page_of(
-    "ClutchPage", ClutchOut, "Clutches, the lowest safe bound first or by name.", "The clutches of this page"
+    "ClutchPage", ClutchOut, "Clutches, what needs somebody first or by name.", "The clutches of this page"
 )

@@ -45,12 +45,14 @@ REACHED = PassageStatus.REACHED.value
 SHOWN = "particle"
 #: The warning of an answer beside which runs are held.
 HELD_RUNS = "held_runs"
-#: A clutch without a prediction comes after all others in a list.
-RANK_UNKNOWN = 2 * HORIZON
+#: Among clutches in the same state one without a prediction comes after all others; a life that has ended comes last of all.
+RANK_UNKNOWN, RANK_ENDED = 2 * HORIZON, 3 * HORIZON
 
 
 def rank_of(summary: Mapping[str, Any]) -> float:
-    """Where a clutch comes in a list: the fewer cycles it is safe for, held runs considered, the earlier."""
+    """Where a clutch comes among those in its state: the fewer cycles it is safe for, held runs considered, the earlier."""
+    if summary.get("ended") is not None:
+        return RANK_ENDED
     if summary.get("status", INSUFFICIENT) == INSUFFICIENT:
         return RANK_UNKNOWN
     bound = bound_of(summary)
@@ -183,21 +185,27 @@ def silence_in_words(since: str) -> str:
 
 
 def top_line(
-    summary: Mapping[str, Any], *, disputed: bool, diagnosis: Mapping[str, Any] | None = None, silent: str | None = None
+    summary: Mapping[str, Any],
+    *,
+    disputed: bool,
+    diagnosis: Mapping[str, Any] | None = None,
+    silent: str | None = None,
+    raised: int = 0,
 ) -> dict[str, str]:
     """What stands first on a clutch's page and in `clutchlife status`: `headline`, its state in words, the safe bound in
-    cycles and days, and the median; `action`, what to do. `diagnosis`: the newest one as it goes out."""
+    cycles and days, and the median; `action`, what to do. `diagnosis`: the newest one as it goes out; `raised`: how many
+    alarms nobody has acknowledged."""
     name, reason = _state_and_reason(summary, disputed=disputed, silent=silent)
     words = STATE_WORDS[name]
     if "status" not in summary:
-        return {"headline": f"{words}: {reason}", "action": _action(name, summary, "soon", diagnosis)}
+        return {"headline": f"{words}: {reason}", "action": _action(name, summary, "soon", diagnosis, raised)}
     at_least = bound_of(summary)
     paced = pace_in_words(summary.get("pace"), at_least)
     soon = "now" if at_least is not None and at_least < 1.0 else "soon" if paced is None else f"within {paced}"
     says = _numbers_in_words(summary, at_least, paced)
     return {
         "headline": f"{words}: {reason}; {says}" if reason else f"{words}: {says}",
-        "action": _action(name, summary, soon, diagnosis),
+        "action": _action(name, summary, soon, diagnosis, raised),
     }
 
 
@@ -219,9 +227,11 @@ def _numbers_in_words(summary: Mapping[str, Any], at_least: float | None, paced:
     return f"{bound}; 50 % chance of {round(median / unit) * unit:,.0f} or more"
 
 
-def _action(name: str, summary: Mapping[str, Any], soon: str, diagnosis: Mapping[str, Any] | None) -> str:
-    """What to do about a state, in one sentence; `soon`: how soon."""
+def _action(name: str, summary: Mapping[str, Any], soon: str, diagnosis: Mapping[str, Any] | None, raised: int) -> str:
+    """What to do about a state, in one sentence; `soon`: how soon. Alarms ask for somebody where the state does not."""
     held = summary.get("held", 0)
+    if summary.get("ended") and not held:
+        return "Its life has ended: record the rebuild, or archive it."
     if name == FAILURE:
         unseen = summary["status"] == REACHED and untested_since(summary) is not None
         return "Run a stationary test, or replace the clutch." if unseen else "Replace the clutch."
@@ -238,8 +248,12 @@ def _action(name: str, summary: Mapping[str, Any], soon: str, diagnosis: Mapping
         tests = "one more stationary test" if missing == 1 else f"{missing} more stationary tests, at different cycles"
         alike = ", with the pressures and oil of this life's first test" if _tests_unlike_first(summary) else ""
         return f"Run {tests}{alike}: then the remaining life is predicted."
+    if name == NORMAL and raised:
+        return (
+            "Look at the alarm and acknowledge it." if raised == 1 else f"Look at {raised} alarms and acknowledge them."
+        )
     if name == NORMAL or diagnosis is None:
-        return "Its life has ended: nothing to do." if summary.get("ended") else "Nothing to do: carry on testing."
+        return "Nothing to do: carry on testing."
     causes = [_cause_in_words(cause) for cause in diagnosis["causes"]]
     if diagnosis["adoptable"] and diagnosis["verdict"] == NAMED:
         return f"Adopt the model with {' and '.join(causes)}: it explains where data and model disagree."

@@ -1,4 +1,5 @@
-"""Alarms on the pages: a rule is made in a form, a posted run raises an alarm, somebody acknowledges it, and it stays so."""
+"""Alarms on the pages: a rule is made in a form, a posted run raises an alarm, which is in sight everywhere until somebody
+acknowledges it, and it stays so."""
 
 import pytest
 from playwright.sync_api import expect
@@ -32,8 +33,22 @@ def test_a_rule_is_made_an_alarm_raised_and_acknowledged(watched: Watched, serve
     events = page.get_by_role("table", name="Alarms, the newest first")
     expect(events).to_contain_text("Not acknowledged")
     assert violations(page) == []
-    events.get_by_role("button", name="Acknowledge").click()
-    expect(events).to_contain_text("Acknowledged by")
+    for path, places in (("/", ("#raised", "tr .raised")), ("/clutches/bench", ("#raised", ".title .notice"))):
+        page.goto(f"{server.url}{path}")
+        for place in places:
+            expect(page.locator(place)).to_be_visible()
+    assert violations(page) == []
+    expect(page.locator("#action")).to_have_text("Look at the alarm and acknowledge it.")
+    page.locator(".title").get_by_role("button", name="Acknowledge").click()
+    asked = page.get_by_role("dialog", name="Acknowledge the alarm")
+    asked.get_by_label("Note").fill("a new one is ordered")
+    assert violations(page) == []
+    page.keyboard.press("Enter")
+    for place in ("#raised", ".title .notice"):
+        expect(page.locator(place)).to_be_hidden()
+    expect(page.locator("#action")).to_have_text("Nothing to do: carry on testing.")
+    page.goto(f"{server.url}/clutches/bench#/alarms")
+    expect(events).to_contain_text("a new one is ordered")
     post(server.http, "bench", stationary(4000, pressures=(5.0,)))
     page.goto(f"{server.url}/#/alarms")
     events.wait_for()

@@ -8,6 +8,7 @@ import { rowFiles } from "../shared/files.js";
 import { moment } from "../shared/format.js";
 import { problemView } from "../shared/problem_view.js";
 import { askReceiver, askRule, ruleText } from "./form.js";
+import { askAcknowledge } from "./raised.js";
 
 /** Events that are shown; the list of the API holds all. */
 const SHOWN = 50;
@@ -43,21 +44,29 @@ export function alarms(place, clutchId) {
 
   /** @param {EventOut[]} raised */
   function drawEvents(raised) {
-    const acknowledge = (/** @type {EventOut} */ { event_id: id }) =>
-      told("POST", `/v1/alarms/events/${id}/acknowledge`, { note: "" });
+    const acknowledge = async (/** @type {EventOut} */ event) => (await askAcknowledge(event)) && show();
     const rows = raised.map((event) => [
       moment(event.raised_at),
       h("a", { href: `/clutches/${encodeURIComponent(event.clutch_id)}` }, event.clutch_id),
       event.message,
-      event.state === "acknowledged" ? `Acknowledged by ${event.acknowledged_by ?? ""}` : STATES[event.state],
-      event.state === "raised" && act("Acknowledge", () => acknowledge(event), event.message),
+      event.state === "acknowledged" ? acknowledgedText(event) : STATES[event.state],
+      event.state === "raised" && act("Acknowledge …", () => acknowledge(event), event.message),
     ]);
     const columns = ["Raised", "Clutch", "What", "State", "Action"];
     events.replaceChildren(
       ...listed("Alarms", "No alarm has been raised.", table("Alarms, the newest first", columns, rows)),
       rowFiles("alarms", [
-        ["raised at", "clutch", "message", "state", "acknowledged by", "value", "limit"],
-        ...raised.map((e) => [e.raised_at, e.clutch_id, e.message, e.state, e.acknowledged_by, e.value, e.limit]),
+        ["raised at", "clutch", "message", "state", "acknowledged by", "note", "value", "limit"],
+        ...raised.map((e) => [
+          e.raised_at,
+          e.clutch_id,
+          e.message,
+          e.state,
+          e.acknowledged_by,
+          e.note,
+          e.value,
+          e.limit,
+        ]),
       ]),
     );
   }
@@ -135,6 +144,9 @@ export function alarms(place, clutchId) {
 
   return show;
 }
+
+/** @param {EventOut} event */
+const acknowledgedText = ({ acknowledged_by: by, note }) => `Acknowledged by ${by ?? ""}${note && `: ${note}`}`;
 
 /** @type {(title: string, empty: string, all: HTMLTableElement) => HTMLElement[]} a heading, and the rows or that there are none */
 const listed = (title, empty, all) => [

@@ -4,6 +4,7 @@
 
 import { diagnosisTab } from "../diagnosis/diagnosis.js";
 import { alarms } from "../alarms/alarms.js";
+import { pollRaised } from "../alarms/raised.js";
 import { painted } from "../charts/plotting.js";
 import { engagementsTab } from "../engagements/engagements.js";
 import { sender } from "../sending/sending.js";
@@ -112,12 +113,14 @@ async function poll() {
   if (shown.get(name) === key) await part.poll?.();
   else await part.show(item);
   shown.set(name, key); // after all of it is read: an error midway is made good at the next poll
-  if (name === "overview") await drawReport();
+  await Promise.all([pollRaised(), name === "overview" && drawReport()]);
 }
 
 /** @param {ClutchOut} clutch */
 function drawHead(clutch) {
-  byId("head").replaceChildren(...head(clutch, { archive: () => done(askArchive(ID, true)), end: endOrTakeBack }));
+  byId("head").replaceChildren(
+    ...head(clutch, { archive: () => done(askArchive(ID, true)), end: endOrTakeBack, refresh }),
+  );
   painted().then(() => performance.mark("head-shown"));
   const back = button("Bring it back …", () => done(askArchive(ID, false)));
   const text = "This clutch is archived: it is not in the list of clutches and accepts no new runs.";

@@ -3,6 +3,7 @@
 // Open this file first (what is asked for and shown), then rows.js (which rows are drawn) and row.js (one of them).
 
 import { alarms } from "../alarms/alarms.js";
+import { pollRaised, showRaised } from "../alarms/raised.js";
 import { register } from "../sending/registration.js";
 import { sender } from "../sending/sending.js";
 import { at, clutchPath, read, send } from "../shared/api.js";
@@ -63,7 +64,10 @@ function turn() {
 }
 
 async function poll() {
-  if (turn() === "alarms") return showAlarms();
+  if (turn() === "alarms") {
+    await Promise.all([showAlarms(), pollRaised()]);
+    return;
+  }
   const question = chosen();
   const part = rows.wanted();
   const list = `/v1/clutches?${question}${question && "&"}sort=${SORT.value}&offset=${part.offset}&limit=${part.limit}`;
@@ -79,6 +83,7 @@ async function poll() {
 /** @type {(counted: FleetTotals, items: ClutchOut[], part: Part) => void} `part`: of the list that they are */
 function show(counted, items, part) {
   totals = counted;
+  showRaised(counted.alarms);
   document.getElementById("nothing")?.remove();
   if (counted.all === 0 && !wanted().has("find")) {
     byId("chips").replaceChildren();
