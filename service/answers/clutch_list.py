@@ -15,7 +15,7 @@ from service.api.base import schema_fields
 from service.api.clutch import ClutchOut
 from service.clutch.condition import NORMAL, RANK_ENDED, STATES, stated
 from service.paging import Part, by_name, page_as_bytes
-from storage import alarms, clutches, diagnoses, runs
+from storage import alarms, clutches, diagnoses
 from storage.clutches import ByNeed, ClutchRow, ClutchSelection
 from storage.engine.database import Database
 
@@ -99,23 +99,19 @@ def _round_above(row: ClutchRow) -> float:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Shown:
-    """A clutch with the number of its held runs, its newest finished diagnosis and its alarms that nobody has acknowledged,
-    both as they go out."""
+    """A clutch with its newest finished diagnosis and its alarms that nobody has acknowledged, both as they go out."""
 
     row: ClutchRow
-    held: int
     diagnosis: dict[str, Any] | None
     alarms: list[dict[str, Any]]
 
 
 def _shown(connection: Connection, rows: Sequence[ClutchRow]) -> list[_Shown]:
     names = [row.clutch_id for row in rows]
-    newest, held_counts = diagnoses.newest(connection, names), runs.held(connection, names)
-    raised = alarms.raised(connection, names)
+    newest, raised = diagnoses.newest(connection, names), alarms.raised(connection, names)
     return [
         _Shown(
             row=row,
-            held=held_counts.get(row.clutch_id, 0),
             diagnosis=repository.latest_diagnosis(row, newest.get(row.clutch_id)),
             alarms=[raising.event_out(event) for event in raised.get(row.clutch_id, [])],
         )
@@ -129,7 +125,7 @@ def _item(clutch: _Shown) -> dict[str, Any]:
         "runs": row.summary.get("runs", 0),
         "recent": row.summary.get("recent"),
         "summary": stated(row.summary),
-        "held": clutch.held,
+        "held": row.summary.get("held", 0),
         "alarms": clutch.alarms,
         "diagnosis": diagnosis,
         "state": repository.condition(row),

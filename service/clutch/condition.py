@@ -119,6 +119,12 @@ def bound_of(summary: Mapping[str, Any]) -> float | None:
     return lower_bound(summary["at_least"], _with_held(summary))
 
 
+def median_of(summary: Mapping[str, Any]) -> float:
+    """The median of the remaining cycles, the lower of both where runs are held; at most the horizon."""
+    medians = [each["remaining_cycles"]["0.5"] for each in (summary, _with_held(summary)) if each is not None]
+    return min((float(median) for median in medians if median is not None), default=HORIZON)
+
+
 def _warning_about_held_runs(payload: Mapping[str, Any], among: Mapping[str, Any], count: int) -> dict[str, str]:
     """What held runs would make of an answer, by all that it states: where both are unknown the safe bounds may differ."""
     if all(among[name] == payload[name] for name in ("status", "remaining_cycles", "at_least")):
