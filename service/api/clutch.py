@@ -117,6 +117,7 @@ class ClutchIn(base.Schema):
     severity: SeverityIn = Field(default=SeverityIn(), description="How much a duty cycle ages the clutch")
     torque_filter_ms: TorqueFilter = None
     origin: base.Origin = "measured"
+    note: base.Reason = Field(default="", description="A remark, such as where the clutch comes from")
 
     @property
     def torque_filter(self) -> float:
@@ -142,6 +143,7 @@ class ClutchEdit(base.Schema):
     severity: SeverityIn = Field(default=_STAYS, description="How much a duty cycle ages the clutch")
     torque_filter_ms: TorqueFilter = None
     origin: base.Origin = Field(default=_STAYS)
+    note: base.Reason = Field(default=_STAYS, description="A remark, such as where the clutch comes from")
 
     @model_validator(mode="after")
     def _says_why(self) -> Self:
@@ -236,6 +238,7 @@ class ClutchOut(base.Answer):
     severity: SeverityIn = Field(description="How much a duty cycle ages the clutch")
     torque_filter_ms: TorqueFilter
     origin: base.Origin
+    note: str = Field(description="A remark, such as where the clutch comes from")
     archived: bool = Field(description="Whether the clutch is archived: lists omit it, and it takes no more runs")
     created_at: str = Field(description="When it was registered; UTC, ISO 8601")
     revision: base.Revision

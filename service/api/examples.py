@@ -42,6 +42,7 @@ _SHARED: tuple[tuple[Any, str], ...] = (
     (0.134, "mean_cof value initial_mean_cof median initial"), (0.001, "mean_cof_sd sd"),
     (0.2, "rmse_nm excess health"), (0.002, "film_time_sd_s now_sd"), (5100, "at_least true_remaining_cycles"),
     (_QUANTILES, "end_of_life_cycles recent_duty_cycles remaining_blocks remaining_cycles quantiles"),
+    ("lot 7, second supplier", "ClutchIn.note ClutchEdit.note ClutchOut.note"),
     (7, "held normal"), (2.0, "median_within"), (1, "FleetTotals.alarms"), (2.1, "intercept order"),
     (0.067, "threshold_mean_cof Criterion.limit CriterionOutcome.limit"), (0.8, "alpha_lambda probability_first"),
     (12, "all clutches"),

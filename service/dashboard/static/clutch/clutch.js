@@ -7,8 +7,9 @@ import { alarms } from "../alarms/alarms.js";
 import { pollRaised } from "../alarms/raised.js";
 import { painted } from "../charts/plotting.js";
 import { engagementsTab } from "../engagements/engagements.js";
+import { copyOf, edit, register } from "../sending/registration.js";
 import { sender } from "../sending/sending.js";
-import { Problem, read } from "../shared/api.js";
+import { at, Problem, read } from "../shared/api.js";
 import { button, byId, h, showTab } from "../shared/dom.js";
 import { Live } from "../shared/live.js";
 import { placeUnits } from "../shared/units.js";
@@ -118,14 +119,26 @@ async function poll() {
 
 /** @param {ClutchOut} clutch */
 function drawHead(clutch) {
-  byId("head").replaceChildren(
-    ...head(clutch, { archive: () => done(askArchive(ID, true)), end: endOrTakeBack, refresh }),
-  );
+  const copy = () => registerLike(clutch);
+  const asks = {
+    archive: () => done(askArchive(ID, true)),
+    end: endOrTakeBack,
+    edit: () => done(edit(clutch)),
+    copy,
+    refresh,
+  };
+  byId("head").replaceChildren(...head(clutch, asks));
   painted().then(() => performance.mark("head-shown"));
   const back = button("Bring it back …", () => done(askArchive(ID, false)));
   const text = "This clutch is archived: it is not in the list of clutches and accepts no new runs.";
   byId("archived").replaceChildren(clutch.archived ? h("div.notice", h("p", text), back) : "");
   makeReport(byId("report"), { clutch });
+}
+
+/** @param {ClutchOut} clutch */
+async function registerLike(clutch) {
+  const id = await register("", { record: copyOf(clutch) });
+  if (id !== null) location.assign(at(`/clutches/${encodeURIComponent(id)}`));
 }
 
 async function endOrTakeBack() {

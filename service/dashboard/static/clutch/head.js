@@ -8,11 +8,11 @@ import { colourOf, heldText, stateIcon } from "../shared/state.js";
 
 /**
  * @param {ClutchOut} clutch
- * @param {{ archive: () => unknown, end: () => unknown, refresh: () => unknown }} asks whether the clutch is to be archived;
- *   about its end; for the clutch once more
+ * @param {{ archive: () => unknown, end: () => unknown, edit: () => unknown, copy: () => unknown, refresh: () => unknown }} asks
+ *   whether the clutch is to be archived; about its end, its record, another like it; for the clutch once more
  * @returns {HTMLElement[]}
  */
-export function head(clutch, { archive, end, refresh }) {
+export function head(clutch, { archive, end, edit, copy, refresh }) {
   const { state, headline, action } = clutch;
   const [word, ...rest] = headline.split(": ");
   const simulated = clutch.origin === "simulated" && h("span.tag", "simulated");
@@ -25,6 +25,8 @@ export function head(clutch, { archive, end, refresh }) {
         h("h1", clutch.clutch_id, simulated),
         !clutch.archived &&
           menu("More", [
+            { label: "Edit the record …", onclick: edit },
+            { label: "Register another like it …", onclick: copy },
             ...(clutch.summary ? [{ label: ended ? "Take the end back …" : "End of life …", onclick: end }] : []),
             { label: "Archive …", onclick: archive },
           ]),
@@ -39,7 +41,7 @@ export function head(clutch, { archive, end, refresh }) {
       ),
       h("p.action", { id: "action" }, action),
       ...raisedNotices(clutch.alarms, refresh),
-      h("p.quiet.description", description(clutch)),
+      h("p.quiet.description", description(clutch), clutch.note && `; ${clutch.note}`),
     ),
   ];
 }
