@@ -12,7 +12,7 @@ from typing import Any
 from models.prognosis.criteria import FEWEST_TESTS, HORIZON
 from models.prognosis.first_passage import PassageStatus
 from service.channels import whole
-from service.clutch.criteria import LONGEST_TEST, MAX_LINE_POINTS, NEAR_LIMIT, SOON
+from service.clutch.criteria import FEW_CYCLES, LONGEST_TEST, MAX_LINE_POINTS, NEAR_LIMIT, SOON
 from service.clutch.items import ENDED, INSUFFICIENT
 from service.clutch.notices import interval_in_words
 from service.clutch.timeline import WORN, Event, Series, date_of
@@ -353,10 +353,11 @@ def _left_open(bound: str, payload: Mapping[str, Any]) -> str:
 
 
 def bound_in_words(at_least: float | None) -> str:
-    """The safe bound of the remaining cycles, rounded down to two digits."""
+    """The safe bound of the remaining cycles, rounded down to two digits; a few are not counted out."""
     if at_least is None or at_least < 1.0:
         return "no further cycle is safe"
-    return f"safe for {rounded_down(at_least)} more {'cycle' if at_least < 2.0 else 'cycles'} (95 %)"
+    shown = f"fewer than {FEW_CYCLES}" if at_least < FEW_CYCLES else rounded_down(at_least)
+    return f"safe for {shown} more cycles (95 %)"
 
 
 def rounded_down(cycles: float) -> str:

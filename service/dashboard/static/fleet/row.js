@@ -93,7 +93,8 @@ function safeFor(summary, scale) {
   if (summary === null) return cell("safe", {}, "–");
   const { ended, status, remaining_cycles: q, at_least: bound } = summary;
   if (ended) return cell("safe", {}, "–");
-  const number = h("span.number", bound === null || bound < 1 ? "0" : roundedDown(bound));
+  const few = bound !== null && bound >= 1 && bound < 10;
+  const number = h("span.number", few ? "< 10" : roundedDown(Math.max(0, bound ?? 0)));
   if (status === "reached") return cell("safe", {}, number, h("small", "reached"));
   if (status === "insufficient_data") return cell("safe", {}, number, h("small", "not known yet"));
   const text = likely(q);
