@@ -7,8 +7,7 @@ import { alarms } from "../alarms/alarms.js";
 import { pollRaised } from "../alarms/raised.js";
 import { painted } from "../charts/plotting.js";
 import { engagementsTab } from "../engagements/engagements.js";
-import { copyOf, edit, register } from "../sending/registration.js";
-import { sender } from "../sending/sending.js";
+import { sender } from "../sending/taking.js";
 import { at, Problem, read } from "../shared/api.js";
 import { button, byId, h, showTab } from "../shared/dom.js";
 import { Live } from "../shared/live.js";
@@ -123,7 +122,7 @@ function drawHead(clutch) {
   const asks = {
     archive: () => done(askArchive(ID, true)),
     end: endOrTakeBack,
-    edit: () => done(edit(clutch)),
+    edit: () => done(editRecord(clutch)),
     copy,
     refresh,
   };
@@ -135,8 +134,12 @@ function drawHead(clutch) {
   makeReport(byId("report"), { clutch });
 }
 
+/** @type {(clutch: ClutchOut) => Asked} */
+const editRecord = async (clutch) => (await import("../sending/registration.js")).edit(clutch);
+
 /** @param {ClutchOut} clutch */
 async function registerLike(clutch) {
+  const { copyOf, register } = await import("../sending/registration.js");
   const id = await register("", { record: copyOf(clutch) });
   if (id !== null) location.assign(at(`/clutches/${encodeURIComponent(id)}`));
 }
