@@ -439,9 +439,10 @@ def condition(row: ClutchRow) -> dict[str, str]:
     return state_of(row.summary, disputed=row.is_disputed, silent=row.silent)
 
 
-def first_line(row: ClutchRow, diagnosis: LatestDiagnosis | None) -> dict[str, str]:
-    """What stands first of the clutch: `headline` and `action`; `diagnosis` is its newest one as it goes out."""
-    return top_line(row.summary, disputed=row.is_disputed, diagnosis=diagnosis, silent=row.silent)
+def first_line(row: ClutchRow, diagnosis: LatestDiagnosis | None, *, raised: int) -> dict[str, str]:
+    """What stands first of the clutch: `headline` and `action`; `diagnosis` is its newest one as it goes out, `raised` how
+    many of its alarms nobody has acknowledged."""
+    return top_line(row.summary, disputed=row.is_disputed, diagnosis=diagnosis, silent=row.silent, raised=raised)
 
 
 def note_dispute(connection: Connection, clutch_id: str) -> None:

@@ -131,6 +131,22 @@ def events(
     return _events.all(connection.execute(query))
 
 
+def raised(connection: Connection, only: Collection[str] | None = None) -> dict[str, list[EventRow]]:
+    """clutch_id -> its alarms that nobody has acknowledged, newest first; of `only` these clutches."""
+    by_clutch: dict[str, list[EventRow]] = {}
+    for row in events(connection, state=RAISED, only=only):
+        by_clutch.setdefault(row.clutch_id, []).append(row)
+    return by_clutch
+
+
+def count_raised(connection: Connection, only: Collection[str] | None = None) -> int:
+    """How many alarms nobody has acknowledged; of `only` these clutches."""
+    query = select(func.count()).select_from(alarm_event).where(_IN_STATE[RAISED])
+    if only is not None:
+        query = query.where(among(alarm_event.c.clutch_id, sorted(only)))
+    return int(connection.execute(query).scalar_one())
+
+
 def clear(connection: Connection, event_id: str, at: str, content: Json) -> None:
     """Note that what raised an alarm is over, with what is said of it from now on."""
     _change_event(connection, event_id, cleared_at=at, content=to_text(content))

@@ -4,13 +4,13 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import Connection, Select, case, func, select, tuple_
+from sqlalchemy import ColumnElement, Connection, Select, case, func, select
 
 from storage.checksums import amend
 from storage.dialects import among, json_fields
 from storage.encoding import Json, Rows, to_text
 from storage.engine.errors import DamagedData
-from storage.tables import HELD_ONLY, clutch, run
+from storage.tables import HELD_ONLY, NOT_CLEARED, alarm_event, clutch, run
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,6 +54,21 @@ class ClutchSelection:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class ByNeed:
+    """An order of clutches, what needs somebody first: those in one of `states`, in their order; then those with an alarm
+    that nobody has acknowledged; then the others; last those whose rank is `over` or more: their lives have ended."""
+
+    states: Sequence[str]
+    over: float
+
+    def place(self) -> ColumnElement[int]:
+        """Where a clutch comes, 0 first."""
+        of_state = [(clutch.c.state == name, place) for place, name in enumerate(self.states)]
+        count = len(of_state)
+        return case((clutch.c.rank >= self.over, count + 2), *of_state, (_with_raised_alarm, count), else_=count + 1)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Counts:
     """How many clutches a choice holds by state, and how many of them have runs that are held."""
 
@@ -67,6 +82,9 @@ _ESCAPED = str.maketrans({sign: f"/{sign}" for sign in "%_/"})
 _kind = json_fields(clutch.c.record, "friction_material", "reaction_plate", "fluid")
 _worst_first = (clutch.c.rank, clutch.c.clutch_id)
 _with_held_runs = clutch.c.clutch_id.in_(select(run.c.clutch_id).where(HELD_ONLY))
+_with_raised_alarm = clutch.c.clutch_id.in_(
+    select(alarm_event.c.clutch_id).where(NOT_CLEARED, alarm_event.c.acknowledged_at.is_(None))
+)
 _number = select(func.count()).select_from(clutch)
 
 
@@ -84,18 +102,20 @@ def page(
     choice: ClutchSelection = ClutchSelection(),
     *,
     limit: int | None,
-    after: tuple[float, str] | None = None,
+    after: str = "",
     left_out: int = 0,
-    by_name: bool = False,
+    by_need: ByNeed | None = None,
     by_kind: bool = False,
 ) -> list[ClutchRow]:
-    """At most `limit` clutches of a choice, worst first, or by their ids: then none is left out or repeated however ranks
-    change between two pages. `after` is the (rank, clutch_id) of the last clutch of the page before; the first `left_out`
-    behind it are passed over. `by_kind`: those of the same materials and fluid together, worst first; without `after`."""
-    order = (clutch.c.clutch_id,) if by_name else (_kind, *_worst_first) if by_kind else _worst_first
+    """At most `limit` clutches of a choice by their ids behind the id `after`: none is left out or repeated whatever changes
+    between two pages. `by_need`: those that need somebody first, then the lowest rank; `by_kind`: and those of the same
+    materials and fluid together. The first `left_out` are passed over."""
+    order: list[ColumnElement[Any]] = [clutch.c.clutch_id]
+    if by_need is not None:
+        order = [*([_kind] if by_kind else []), by_need.place(), *_worst_first]
     query = _chosen(select(clutch.c.clutch_id), choice).order_by(*order).limit(limit).offset(left_out)
-    if after is not None:
-        query = query.where(clutch.c.clutch_id > after[1] if by_name else tuple_(*_worst_first) > tuple_(*after))
+    if after:
+        query = query.where(clutch.c.clutch_id > after)
     # their ids by an index alone, however many are passed over; then the rows
     ids = list(connection.execute(query).scalars())
     found = connection.execute(select(clutch).where(clutch.c.clutch_id.in_(ids)))

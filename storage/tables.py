@@ -38,10 +38,10 @@ HELD_ONLY = text("state = 'held'")
 OPEN_ONLY = text("state IN ('waiting', 'running')")
 
 #: `record` is the record in force, defaults filled in, `registered` that which was posted, where it was edited since; `rank`
-#: sorts lists, worst first ascending; `archived` is 1 for a clutch that lists leave out. `state` is the name of its state
-#: (NAMUR NE 107), which follows from the summary and `disputed`: the life of which the newest finished diagnosis found that
-#: data and model disagree, null where there is none or its model is adopted. `searched` is what a search looks into,
-#: folded. `silent`: since when its rig has sent nothing, where an alarm of that is raised.
+#: sorts those in a state, worst first ascending; `archived` is 1 for a clutch that lists leave out. `state` is the name of
+#: its state (NAMUR NE 107), which follows from the summary and `disputed`: the life of which the newest finished diagnosis
+#: found that data and model disagree, null where there is none or its model is adopted. `searched` is what a search looks
+#: into, folded. `silent`: since when its rig has sent nothing, where an alarm of that is raised.
 clutch = Table(
     "clutch",
     metadata,

@@ -172,7 +172,7 @@ class Outbox:
                 self._judged.clear()
                 self._heard.clear()
                 return
-            page = clutches.page(connection, limit=None, by_name=True)
+            page = clutches.page(connection, limit=None)
             rows = [row for row in page if "damaged" not in row.summary]
             silences = self._silences(alarms.last_heard(connection, [row.clutch_id for row in rows]))
         judged = set()

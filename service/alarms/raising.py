@@ -1,7 +1,8 @@
 """Raises and clears alarms, and fills the outbox, in the transaction that stores a clutch's results.
 
-While an alarm is not cleared, its rule raises no other of the clutch. It is cleared when its value has come back by the
-hysteresis, or when nothing can be said any more: after a rebuild, where the rule is gone.
+While an alarm is not cleared, its rule raises no other of the clutch, but where the end has come nearer by a step: then
+another takes its place. It is cleared when its value has come back by the hysteresis, or when nothing can be said any more:
+after a rebuild, where the rule is gone.
 """
 
 import json
@@ -127,7 +128,7 @@ def _judged(row: AlarmRow, rule: AlarmIn, facts: ClutchFacts, before: EventRow |
     if not rules.passes(rule, finding):
         return set()
     if before is not None:
-        _clear(before, facts)
+        _clear(before, facts, replaced=finding.step is not None and before.quantity == rule.quantity)
     if not _reopened(row, rule, facts, finding):
         _raise(row, rule, facts, finding)
     return {row.alarm_id}
@@ -135,7 +136,7 @@ def _judged(row: AlarmRow, rule: AlarmIn, facts: ClutchFacts, before: EventRow |
 
 def _is_of(event: EventRow, rule: AlarmIn, finding: Finding) -> bool:
     """Whether an alarm is of what a rule watches and finds now."""
-    return (event.quantity, event.mark) == (rule.quantity, finding.mark)
+    return event.quantity == rule.quantity and finding.is_of(event.mark)
 
 
 def _raise(row: AlarmRow, rule: AlarmIn, facts: ClutchFacts, finding: Finding) -> None:
@@ -175,11 +176,13 @@ def _reopened(row: AlarmRow, rule: AlarmIn, facts: ClutchFacts, finding: Finding
     return False
 
 
-def _clear(event: EventRow, facts: ClutchFacts) -> None:
+def _clear(event: EventRow, facts: ClutchFacts, *, replaced: bool = False) -> None:
+    """Note that an alarm is over; receivers learn of it, unless another of its rule has `replaced` it."""
     ended = {} if facts.summary.get("ended") is None else {_ENDED_LIFE: facts.summary.get("life", "")}
     content = {name: value for name, value in event.content.items() if name != _ENDED_LIFE}
     alarms.clear(facts.connection, event.event_id, facts.now, content | ended)
-    _tell(facts.connection, CLEARED, event.event_id, of_cleared=True)
+    if not replaced:
+        _tell(facts.connection, CLEARED, event.event_id, of_cleared=True)
 
 
 def _tell(connection: Connection, kind: str, event_id: str, *, of_cleared: bool) -> None:

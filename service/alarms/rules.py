@@ -27,6 +27,8 @@ from storage.results import FitRow
 _SECONDS_PER_DAY = 86400.0
 #: The quantile that is the safe bound.
 _SAFE = 0.05
+#: Shares of the limit of remaining life: at each its alarm is raised again. Chosen: an order, a date, a spare at hand.
+STEPS = (0.5, 0.25)
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,11 +66,17 @@ class ClutchFacts:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Finding:
     """What a rule finds: its value, the clause that says it, and a `mark` of what it is about; the same mark, the same
-    alarm."""
+    alarm. Of remaining life: its `median`, and the `step` that the value has passed, which is the mark."""
 
     value: float | None
     words: str
     mark: str = ""
+    median: float = 0.0
+    step: int | None = None
+
+    def is_of(self, mark: str) -> bool:
+        """Whether an alarm of that mark is about this: a step on the way to the end includes those before it."""
+        return self.mark == mark or (self.step is not None and self.step < int(mark or 0))
 
 
 def finding(rule: AlarmIn, facts: ClutchFacts) -> Finding | None:
@@ -81,14 +89,17 @@ def passes(rule: AlarmIn, result: Finding, hysteresis: float = 0.0) -> bool:
     if result.value is None:
         return True
     if rule.below is not None:
-        return result.value < rule.below + hysteresis * abs(rule.below)
+        limit = rule.below + hysteresis * abs(rule.below)
+        shown = rule.median_within is None or result.step is None or result.median < rule.median_within * limit
+        return result.value < limit and shown
     return rule.above is not None and result.value > rule.above - hysteresis * abs(rule.above)
 
 
 def message(rule: AlarmIn, facts: ClutchFacts, result: Finding) -> str:
     """An alarm as a sentence, with how many runs are held beside it."""
     unit, held_count = _UNITS.get(rule.quantity), facts.summary.get("held", 0)
-    limit = "" if rule.limit is None or unit is None else f" (limit: {rule.limit:,.6g}{unit})"
+    again = f"; less than {100 * STEPS[result.step - 1]:.0f} % of it is left" if result.step else ""
+    limit = "" if rule.limit is None or unit is None else f" (limit: {rule.limit:,.6g}{unit}{again})"
     waiting = f"; {condition.held_in_words(held_count)}" if held_count and rule.quantity != "held_runs" else ""
     return f"{facts.clutch_id}: {result.words}{limit}{waiting}"
 
@@ -108,38 +119,46 @@ def slope_quantile(rule: AlarmIn, fit: FitRow, geometry: Geometry) -> float | No
     return margin / geometry.torque_per_cof(fit.mean_pressure)
 
 
-def _remaining(rule: AlarmIn, facts: ClutchFacts) -> float | None:
-    """The remaining cycles at the rule's quantile; None where nothing is known, or they are beyond the horizon."""
+def _remaining(rule: AlarmIn, facts: ClutchFacts) -> tuple[float, float] | None:
+    """The remaining cycles at the rule's quantile and their median, held runs considered, at most the horizon; None where
+    nothing is known, or the quantile is beyond the horizon."""
     summary = facts.summary
     if summary.get("status", INSUFFICIENT) in (INSUFFICIENT, ENDED):
         return None
     if summary["status"] == PassageStatus.REACHED.value:
-        return 0.0
-    cycles = (
-        condition.bound_of(summary)
-        if rule.probability == _SAFE
-        else summary["remaining_cycles"][f"{rule.probability:g}"]
-    )
-    return None if cycles is None else float(cycles)
+        return 0.0, 0.0
+    own = summary["remaining_cycles"][f"{rule.probability:g}"]
+    cycles = condition.bound_of(summary) if rule.probability == _SAFE else own
+    return None if cycles is None else (float(cycles), condition.median_of(summary))
 
 
 def _remaining_cycles(rule: AlarmIn, facts: ClutchFacts) -> Finding | None:
-    value = _remaining(rule, facts)
-    return None if value is None else Finding(value=value, words=_left(rule, value))
+    known = _remaining(rule, facts)
+    return None if known is None else _of_remaining(rule, *known, _left(rule, *known))
 
 
-def _left(rule: AlarmIn, cycles: float) -> str:
-    if rule.probability == _SAFE or cycles < 1.0:
+def _of_remaining(rule: AlarmIn, value: float, median: float, words: str) -> Finding:
+    """What is found of remaining cycles or days, with the step that they have passed."""
+    step = sum(value < share * (rule.limit or 0.0) for share in STEPS)
+    return Finding(value=value, words=words, median=median, step=step, mark=f"{step}")
+
+
+def _left(rule: AlarmIn, cycles: float, median: float) -> str:
+    """The remaining cycles at the rule's quantile, and how sure that is: their median."""
+    if cycles < 1.0 and median < 1.0:
         return condition.bound_in_words(cycles)
-    return f"{condition.chance_in_words(1.0 - rule.probability)} chance of {cycles:,.0f} or more cycles"
+    half = f"50 % chance of {condition.rounded_down(max(1.0, median))} or more"
+    if rule.probability == _SAFE:
+        return f"{condition.bound_in_words(cycles)}, {half}"
+    return f"{condition.chance_in_words(1.0 - rule.probability)} chance of {cycles:,.0f} or more cycles, {half}"
 
 
 def _remaining_days(rule: AlarmIn, facts: ClutchFacts) -> Finding | None:
-    value, pace = _remaining(rule, facts), facts.summary.get("pace")
-    if value is None or pace is None:
+    known, pace = _remaining(rule, facts), facts.summary.get("pace")
+    if known is None or pace is None:
         return None
-    days = value / pace["cycles_per_second"] / _SECONDS_PER_DAY
-    return Finding(value=days, words=f"{_left(rule, value)}: {condition.pace_in_words(pace, value)}")
+    days, median = (cycles / pace["cycles_per_second"] / _SECONDS_PER_DAY for cycles in known)
+    return _of_remaining(rule, days, median, f"{_left(rule, *known)}: {condition.pace_in_words(pace, known[0])}")
 
 
 def _health(_rule: AlarmIn, facts: ClutchFacts) -> Finding | None:

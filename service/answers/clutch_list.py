@@ -1,26 +1,30 @@
-"""`/v1/clutches`: clutches worst first or by name, as lists show them; `/v1/fleet/totals`: how many there are."""
+"""`/v1/clutches`: clutches by who needs somebody or by name, as lists show them; `/v1/fleet/totals`: how many there are."""
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from sqlalchemy import Connection
 
 from models.prognosis.criteria import HORIZON
 from service import repository
+from service.alarms import raising
 from service.answers.cache import AnswerCache, to_json
+from service.api.alarm import EventOut
 from service.api.base import of_row
 from service.api.clutch import ClutchOut, LatestDiagnosis
 from service.api.fleet import FleetTotals, StateCounts
-from service.clutch.condition import STATES, stated
+from service.clutch.condition import NORMAL, RANK_ENDED, STATES, stated
 from service.paging import Part, by_name, page_as_bytes
-from storage import clutches, diagnoses, runs
-from storage.clutches import ClutchRow, ClutchSelection
+from storage import alarms, clutches, diagnoses
+from storage.clutches import ByNeed, ClutchRow, ClutchSelection
 from storage.engine.database import Database
 
 #: Share of the clutches whose bars fit, and the cycles at the bars' end where nothing is predicted. Chosen: one that lasts
 #: much longer than the others must not shorten their bars to nothing; a rig's usual life.
 _FITTING, _USUAL_SCALE = 0.9, 10_000.0
+#: The order of lists: states by how soon they need somebody, ended lives last.
+_BY_NEED = ByNeed(states=[name for name in STATES if name != NORMAL], over=RANK_ENDED)
 
 
 def look_up(database: Database, clutch_id: str) -> ClutchOut:
@@ -35,7 +39,7 @@ def every(database: Database, *, at_once: int) -> Iterator[ClutchOut]:
     part: Part | None = Part(at_once)
     while part is not None:
         with database.reading() as connection:
-            rows = clutches.page(connection, ClutchSelection(), limit=part.most, after=part.after, by_name=True)
+            rows = clutches.page(connection, ClutchSelection(), limit=part.most, after=part.name)
             items = list(map(_item, _shown(connection, rows[:at_once])))
         yield from items
         place = part.next(rows, by_name("clutch_id"))
@@ -45,28 +49,29 @@ def every(database: Database, *, at_once: int) -> Iterator[ClutchOut]:
 def page_as_json(
     database: Database, cache: AnswerCache, choice: ClutchSelection, part: Part, *, offset: int = 0, sort: str = "worst"
 ) -> bytes:
-    """A page of the clutches of a choice; each one's item is made once for its revision and verdict. By kind, a page's place
-    is how many clutches are before it."""
-    by_kind, limit, after = sort == "kind", part.limit, part.after
-    if by_kind:
-        offset, after = offset + int(part.number or 0), None
+    """A page of the clutches of a choice; each one's item is made once for its revision, verdict and alarms. If they are not
+    by name, a page's place is how many clutches are before it."""
+    named, limit = sort == "name", part.limit
+    before = offset + (0 if named else int(part.number or 0))
     with database.reading() as connection:
         rows = clutches.page(
-            connection, choice, limit=part.most, after=after, left_out=offset, by_name=sort == "name", by_kind=by_kind
+            connection,
+            choice,
+            limit=part.most,
+            after=part.name,
+            left_out=before,
+            by_need=None if named else _BY_NEED,
+            by_kind=sort == "kind",
         )
         clutches_shown = _shown(connection, rows[:limit])
 
     def item(clutch: _Shown) -> bytes:
-        row, _, diagnosis, _ = clutch
-        version = (row.revision, row.state, None if diagnosis is None else to_json(diagnosis))
-        return cache.answer(("clutch", row.clutch_id), version, lambda: to_json(_item(clutch))).body
+        beside = [to_json(each) for each in (clutch.diagnosis, *clutch.alarms) if each is not None]
+        version = (clutch.row.revision, clutch.row.state, *beside)
+        return cache.answer(("clutch", clutch.row.clutch_id), version, lambda: to_json(_item(clutch))).body
 
-    places = {
-        "worst": lambda row: (row.rank, row.clutch_id),
-        "name": by_name("clutch_id"),
-        "kind": lambda _: (float(offset + limit), ""),
-    }
-    return page_as_bytes(list(map(item, clutches_shown)), part.next(rows, places[sort]))
+    place = by_name("clutch_id") if named else lambda _: (float(before + limit), "")
+    return page_as_bytes(list(map(item, clutches_shown)), part.next(rows, place))
 
 
 def totals(database: Database, choice: ClutchSelection) -> FleetTotals:
@@ -74,11 +79,13 @@ def totals(database: Database, choice: ClutchSelection) -> FleetTotals:
     with database.reading() as connection:
         listed = clutches.counts(connection, choice)
         archived = clutches.counts(connection, replace(choice, archived=True))
+        raised = alarms.count_raised(connection, choice.only)
         boundary = clutches.at_rank(connection, replace(choice, find=""), _FITTING, below=HORIZON)
     return FleetTotals(
         all=sum(listed.states.values()),
         archived=sum(archived.states.values()),
         held=listed.held,
+        alarms=raised,
         states=StateCounts(**{name: listed.states.get(name, 0) for name in STATES}),
         scale_cycles=_USUAL_SCALE if boundary is None else _round_above(boundary),
     )
@@ -92,31 +99,40 @@ def _round_above(row: ClutchRow) -> float:
     return next(step * unit for step in (1, 2, 5, 10) if step * unit >= end)
 
 
-#: A clutch with the number of its held runs, its newest finished diagnosis as it goes out, and its state with headline and
-#: action.
-_Shown = tuple[ClutchRow, int, LatestDiagnosis | None, dict[str, object]]
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Shown:
+    """A clutch with its newest finished diagnosis and its alarms that nobody has acknowledged, both as they go out."""
+
+    row: ClutchRow
+    diagnosis: LatestDiagnosis | None
+    alarms: list[EventOut]
 
 
 def _shown(connection: Connection, rows: Sequence[ClutchRow]) -> list[_Shown]:
     names = [row.clutch_id for row in rows]
-    newest, held_counts = diagnoses.newest(connection, names), runs.held(connection, names)
-    shown = []
-    for row in rows:
-        diagnosis = repository.latest_diagnosis(row, newest.get(row.clutch_id))
-        state: dict[str, object] = {"state": repository.condition(row), **repository.first_line(row, diagnosis)}
-        shown.append((row, held_counts.get(row.clutch_id, 0), diagnosis, state))
-    return shown
+    newest, raised = diagnoses.newest(connection, names), alarms.raised(connection, names)
+    return [
+        _Shown(
+            row=row,
+            diagnosis=repository.latest_diagnosis(row, newest.get(row.clutch_id)),
+            alarms=[raising.event_out(event) for event in raised.get(row.clutch_id, [])],
+        )
+        for row in rows
+    ]
 
 
 def _item(clutch: _Shown) -> ClutchOut:
-    row, held, diagnosis, state = clutch
+    row, diagnosis = clutch.row, clutch.diagnosis
     return of_row(
         ClutchOut,
         row,
-        **repository.record(row).model_dump(mode="json") | state,
+        **repository.record(row).model_dump(mode="json"),
+        **repository.first_line(row, diagnosis, raised=len(clutch.alarms)),
+        state=repository.condition(row),
         runs=row.summary.get("runs", 0),
         recent=row.summary.get("recent"),
         summary=stated(row.summary),
-        held=held,
+        held=row.summary.get("held", 0),
+        alarms=clutch.alarms,
         diagnosis=diagnosis,
     )

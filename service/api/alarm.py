@@ -69,6 +69,14 @@ class AlarmIn(base.Schema):
     )
     below: Limit | None = Field(default=None, description="The alarm is raised if the value is below this limit")
     above: Limit | None = Field(default=None, description="The alarm is raised if the value is above this limit")
+    median_within: Annotated[float, Field(ge=1.0, le=base.LARGEST_LIMIT, allow_inf_nan=False, strict=True)] | None = (
+        Field(
+            default=2.0,
+            description="For remaining cycles and days: the alarm is raised only if the median, too, is below so many times"
+            " the limit. With few tests the safe bound is low and the median high: then the tests do not show the end yet."
+            " null: the bound alone decides",
+        )
+    )
     any_of: tuple[base.StateName | base.VerdictName, ...] | None = Field(
         default=None,
         description="States or verdicts that raise the alarm; default: every state but `normal`, or every verdict"

@@ -7,6 +7,7 @@ from pydantic import BeforeValidator, Field, JsonValue, model_validator
 from models.clutch import Geometry
 from models.degradation.severity import Severity, SeverityBasis
 from service.api import base, life
+from service.api.alarm import EventOut
 from service.channels import whole
 
 #: 2.0 is the whole number 2.
@@ -116,6 +117,7 @@ class ClutchIn(base.Schema):
     severity: SeverityIn = Field(default=SeverityIn(), description="How much a duty cycle ages the clutch")
     torque_filter_ms: TorqueFilter = None
     origin: base.Origin = "measured"
+    note: base.Reason = Field(default="", description="A remark, such as where the clutch comes from")
 
     @property
     def torque_filter(self) -> float:
@@ -141,6 +143,7 @@ class ClutchEdit(base.Schema):
     severity: SeverityIn = Field(default=_STAYS, description="How much a duty cycle ages the clutch")
     torque_filter_ms: TorqueFilter = None
     origin: base.Origin = Field(default=_STAYS)
+    note: base.Reason = Field(default=_STAYS, description="A remark, such as where the clutch comes from")
 
     @model_validator(mode="after")
     def _says_why(self) -> Self:
@@ -235,6 +238,7 @@ class ClutchOut(base.Answer):
     severity: SeverityIn = Field(description="How much a duty cycle ages the clutch")
     torque_filter_ms: TorqueFilter
     origin: base.Origin
+    note: str = Field(description="A remark, such as where the clutch comes from")
     archived: bool = Field(description="Whether the clutch is archived: lists omit it, and it takes no more runs")
     created_at: str = Field(description="When it was registered; UTC, ISO 8601")
     revision: base.Revision
@@ -245,12 +249,13 @@ class ClutchOut(base.Answer):
     action: str = Field(description="One sentence: what to do now")
     runs: int = Field(description="Number of runs that count, without held and withdrawn ones")
     held: int = Field(description="Number of held runs, which wait to be confirmed, corrected or withdrawn")
+    alarms: list[EventOut] = Field(description="Its alarms that nobody has acknowledged, newest first")
     summary: ClutchSummary | None = Field(description="Health and remaining life; null before the first run")
     recent: Recent | None = Field(description="The recent history; null before the first run")
     diagnosis: LatestDiagnosis | None = Field(description="The newest finished diagnosis; null without one")
 
 
 class ClutchPage(base.Page[ClutchOut]):
-    """Clutches, the lowest safe bound first or by name."""
+    """Clutches, what needs somebody first or by name."""
 
     items: list[ClutchOut] = Field(description="The clutches of this page")

@@ -164,6 +164,7 @@ class FleetTotals(Answer):
     all: int = Field(description="Clutches in use, or archived ones if requested")
     archived: int = Field(description="Archived clutches")
     held: int = Field(description="Those of `all` that have runs that are held")
+    alarms: int = Field(description="Alarms that nobody has acknowledged")
     states: StateCounts = Field(description="Those of `all` by their states")
     scale_cycles: Real = Field(
         description="End of the common scale for bars of remaining cycles (1, 2 or 5 times a power of ten). Nine "

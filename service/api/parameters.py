@@ -86,9 +86,10 @@ Find = Annotated[
 Sort = Annotated[
     Literal["worst", "name", "kind"],
     Field(
-        description="`worst`: the lowest safe bound first; if remaining cycles change between two pages, a clutch"
-        " may be on both or on neither. `name`: by name; a walk from page to page meets each clutch "
-        "once. `kind`: grouped by friction material, reaction plate and fluid, the worst first"
+        description="`worst`: what needs somebody first: by state, `failure` to `out_of_specification`, then clutches with"
+        " an alarm that nobody acknowledged, then the others, ended lives last; among equals the lowest safe bound first. If"
+        " they change between two pages, a clutch may be on both or on neither. `name`: by name; a walk from page to page"
+        " meets each clutch once. `kind`: grouped by friction material, reaction plate and fluid, the worst first"
     ),
 ]
 Offset = Annotated[

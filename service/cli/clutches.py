@@ -56,7 +56,7 @@ def list_clutches(
     archived: Annotated[bool, typer.Option("--archived", help="Only archived clutches")] = False,
     as_json: options.Json = False,
 ) -> None:
-    """List clutches, worst first, with their state and remaining cycles."""
+    """List clutches, what needs somebody first, with their state and remaining cycles."""
     chosen = {"state": state, "find": find, "archived": "true" if archived else None}
     items = service.pages("/v1/clutches", **{name: value for name, value in chosen.items() if value is not None})
     columns = ("clutch", "state", "at", "safe for", "50 % chance of", "held")

@@ -18,6 +18,7 @@ from service.cli import (
     importing,
     inspections,
     key,
+    mcp,
     runs,
     simulate,
 )
@@ -75,7 +76,7 @@ _COMMANDS: tuple[Callable[..., None], ...] = (
     clutches.list_clutches, clutches.status, clutches.watch, alarms.alarms, answers.life, answers.degradation,
     answers.loops, answers.engagement, inspections.inspect, inspections.inspections, diagnose.diagnose,
     clutches.model, runs.runs, runs.withdraw, database.restore, runs.end, runs.confirm, runs.correct, clutches.edit,
-    clutches.archive, runs.changes, export.export, fleet.score, database.replay, database.backup, database.verify,
+    clutches.archive, runs.changes, export.export, mcp.mcp, fleet.score, database.replay, database.backup, database.verify,
     database.migrate,
 )  # fmt: skip
 #: Names that Python or typer has for something else.

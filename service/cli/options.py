@@ -52,6 +52,13 @@ Database = Annotated[
         help="sqlite:///path, sqlite:////absolute/path, or postgresql+psycopg://user@host/database",
     ),
 ]
+#: The same where a service may be asked instead.
+ChosenDatabase = Annotated[
+    str | None, typer.Option("--database", envvar="CLUTCHLIFE_DATABASE", help="Work on this database; see --url")
+]
+ServiceUrl = Annotated[
+    str | None, typer.Option("--url", envvar="CLUTCHLIFE_URL", help="Ask the service at this address")
+]
 ClutchId = Annotated[str, typer.Argument(metavar="ID")]
 Url = Annotated[str, typer.Option("--url", envvar="CLUTCHLIFE_URL", help="The address of the service")]
 Key = Annotated[str | None, typer.Option("--key", envvar="CLUTCHLIFE_KEY", help="Your key, if the service needs one")]

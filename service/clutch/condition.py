@@ -16,7 +16,7 @@ from service.api.clutch import ClutchSummary, LastRun, LatestDiagnosis, Recent
 from service.api.life import HeldRuns, LifePrediction
 from service.api.run import Warned
 from service.channels import whole
-from service.clutch.criteria import LONGEST_TEST, MAX_LINE_POINTS, NEAR_LIMIT, SOON
+from service.clutch.criteria import FEW_CYCLES, LONGEST_TEST, MAX_LINE_POINTS, NEAR_LIMIT, SOON
 from service.clutch.items import ENDED, INSUFFICIENT
 from service.clutch.notices import interval_in_words
 from service.clutch.timeline import WORN, Event, Series, date_of
@@ -49,12 +49,14 @@ REACHED = PassageStatus.REACHED.value
 SHOWN = "particle"
 #: The warning of an answer beside which runs are held.
 HELD_RUNS = "held_runs"
-#: A clutch without a prediction comes after all others in a list.
-RANK_UNKNOWN = 2 * HORIZON
+#: Among clutches in the same state one without a prediction comes after all others; a life that has ended comes last of all.
+RANK_UNKNOWN, RANK_ENDED = 2 * HORIZON, 3 * HORIZON
 
 
 def rank_of(summary: Mapping[str, Any]) -> float:
-    """Where a clutch comes in a list: the fewer cycles it is safe for, held runs considered, the earlier."""
+    """Where a clutch comes among those in its state: the fewer cycles it is safe for, held runs considered, the earlier."""
+    if summary.get("ended") is not None:
+        return RANK_ENDED
     if summary.get("status", INSUFFICIENT) == INSUFFICIENT:
         return RANK_UNKNOWN
     bound = bound_of(summary)
@@ -140,6 +142,12 @@ def bound_of(summary: Mapping[str, Any]) -> float | None:
     return lower_bound(summary["at_least"], _with_held(summary))
 
 
+def median_of(summary: Mapping[str, Any]) -> float:
+    """The median of the remaining cycles, the lower of both where runs are held; at most the horizon."""
+    medians = [each["remaining_cycles"]["0.5"] for each in (summary, _with_held(summary)) if each is not None]
+    return min((float(median) for median in medians if median is not None), default=HORIZON)
+
+
 def _warning_about_held_runs(payload: Mapping[str, Any], among: Mapping[str, Any], count: int) -> Warned:
     """What held runs would make of an answer, by all that it states: where both are unknown the safe bounds may differ."""
     if all(among[name] == payload[name] for name in ("status", "remaining_cycles", "at_least")):
@@ -206,21 +214,27 @@ def silence_in_words(since: str) -> str:
 
 
 def top_line(
-    summary: Mapping[str, Any], *, disputed: bool, diagnosis: LatestDiagnosis | None = None, silent: str | None = None
+    summary: Mapping[str, Any],
+    *,
+    disputed: bool,
+    diagnosis: LatestDiagnosis | None = None,
+    silent: str | None = None,
+    raised: int = 0,
 ) -> dict[str, str]:
     """What stands first on a clutch's page and in `clutchlife status`: `headline`, its state in words, the safe bound in
-    cycles and days, and the median; `action`, what to do. `diagnosis`: the newest one as it goes out."""
+    cycles and days, and the median; `action`, what to do. `diagnosis`: the newest one as it goes out; `raised`: how many
+    alarms nobody has acknowledged."""
     name, reason = _state_and_reason(summary, disputed=disputed, silent=silent)
     words = STATE_WORDS[name]
     if "status" not in summary:
-        return {"headline": f"{words}: {reason}", "action": _action(name, summary, "soon", diagnosis)}
+        return {"headline": f"{words}: {reason}", "action": _action(name, summary, "soon", diagnosis, raised)}
     at_least = bound_of(summary)
     paced = pace_in_words(summary.get("pace"), at_least)
     soon = "now" if at_least is not None and at_least < 1.0 else "soon" if paced is None else f"within {paced}"
     says = _numbers_in_words(summary, at_least, paced)
     return {
         "headline": f"{words}: {reason}; {says}" if reason else f"{words}: {says}",
-        "action": _action(name, summary, soon, diagnosis),
+        "action": _action(name, summary, soon, diagnosis, raised),
     }
 
 
@@ -242,9 +256,11 @@ def _numbers_in_words(summary: Mapping[str, Any], at_least: float | None, paced:
     return f"{bound}; 50 % chance of {round(median / unit) * unit:,.0f} or more"
 
 
-def _action(name: str, summary: Mapping[str, Any], soon: str, diagnosis: LatestDiagnosis | None) -> str:
-    """What to do about a state, in one sentence; `soon`: how soon."""
+def _action(name: str, summary: Mapping[str, Any], soon: str, diagnosis: LatestDiagnosis | None, raised: int) -> str:
+    """What to do about a state, in one sentence; `soon`: how soon. Alarms ask for somebody where the state does not."""
     held = summary.get("held", 0)
+    if summary.get("ended") and not held:
+        return "Its life has ended: record the rebuild, or archive it."
     if name == FAILURE:
         unseen = summary["status"] == REACHED and untested_since(summary) is not None
         return "Run a stationary test, or replace the clutch." if unseen else "Replace the clutch."
@@ -261,8 +277,15 @@ def _action(name: str, summary: Mapping[str, Any], soon: str, diagnosis: LatestD
         tests = "one more stationary test" if missing == 1 else f"{missing} more stationary tests, at different cycles"
         alike = ", with the pressures and oil of this life's first test" if _tests_unlike_first(summary) else ""
         return f"Run {tests}{alike}: then the remaining life is predicted."
+    if name == NORMAL and raised:
+        return (
+            "Look at the alarm and acknowledge it." if raised == 1 else f"Look at {raised} alarms and acknowledge them."
+        )
+    health = summary["current"]["health"]
+    if name == NORMAL and health is not None and health < SOON:
+        return f"Carry on testing with a replacement at hand: health {100 * health:.0f} %."
     if name == NORMAL or diagnosis is None:
-        return "Its life has ended: nothing to do." if summary.get("ended") else "Nothing to do: carry on testing."
+        return "Nothing to do: carry on testing."
     causes = [_cause_in_words(cause) for cause in diagnosis.causes]
     if diagnosis.adoptable and diagnosis.verdict == NAMED:
         return f"Adopt the model with {' and '.join(causes)}: it explains where data and model disagree."
@@ -353,10 +376,11 @@ def _left_open(bound: str, payload: Mapping[str, Any]) -> str:
 
 
 def bound_in_words(at_least: float | None) -> str:
-    """The safe bound of the remaining cycles, rounded down to two digits."""
+    """The safe bound of the remaining cycles, rounded down to two digits; a few are not counted out."""
     if at_least is None or at_least < 1.0:
         return "no further cycle is safe"
-    return f"safe for {rounded_down(at_least)} more {'cycle' if at_least < 2.0 else 'cycles'} (95 %)"
+    shown = f"fewer than {FEW_CYCLES}" if at_least < FEW_CYCLES else rounded_down(at_least)
+    return f"safe for {shown} more cycles (95 %)"
 
 
 def rounded_down(cycles: float) -> str:

@@ -57,5 +57,7 @@ SOON = 0.2
 #: And where a quantity is nearer to its limit than this share of the way from its initial value. Chosen, on the same lives:
 #: 0.1 calls in 14 % of the simulated assessments with 30 to 50 % left, 0.2 in 64 %.
 NEAR_LIMIT = 0.1
+#: Fewer safe cycles than this are stated as "fewer than". Chosen: nobody plans by the single cycle; no table.
+FEW_CYCLES = 10
 #: Characters of an advised test that the line above a clutch's page shows whole. Chosen: two lines of a phone; no table.
 LONGEST_TEST = 80

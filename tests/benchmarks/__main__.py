@@ -20,7 +20,7 @@ from models.tracking.filters.grid import Grid
 from models.tracking.filters.particle import Particle
 from models.tracking.filters.ukf import Ukf
 from models.tracking.prior import weak
-from tests.benchmarks.pages import pages
+from tests.benchmarks.pages import pages, start_page
 from tests.benchmarks.records import records
 from tests.measuring import show
 from tests.models.tracking.tracked_series import sent
@@ -137,3 +137,4 @@ if __name__ == "__main__":
     tracking()
     records()
     pages()
+    start_page()

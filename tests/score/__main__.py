@@ -11,7 +11,7 @@ from collections.abc import Callable
 from functools import partial
 
 from tests.measuring import Asked, each, publish, where
-from tests.score import belief, filters, fleets, off_prior, paper
+from tests.score import alarms, belief, filters, fleets, off_prior, paper
 
 
 def main() -> None:
@@ -37,6 +37,7 @@ def main() -> None:
         "lag": partial(paper.lag, lives(200), seed + 11),
         "severity": partial(paper.severity, lives(80), seed + 12),
         "after": partial(filters.after_end, lives(100), seed + 8),
+        "alarms": partial(alarms.bounds, lives(1_000), seed + 15),
     }
     names = (os.environ.get("PARTS") or "").split() or list(parts)
     for name, (table, seconds) in zip(names, each(timed, (parts[name] for name in names), where(0)), strict=True):

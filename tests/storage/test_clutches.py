@@ -7,26 +7,44 @@ import pytest
 from sqlalchemy import Connection
 from sqlalchemy.exc import IntegrityError
 
-from storage import clutches, runs
-from storage.clutches import ClutchSelection, Counts
+from storage import alarms, clutches, runs
+from storage.alarms import EventRow
+from storage.clutches import ByNeed, ClutchSelection, Counts
 from storage.engine.database import Database
 from tests.storage.samples import CLUTCH, clutch_row, new_run, read_from, write_to
 
+#: No state comes before another.
+BY_RANK = ByNeed(states=[], over=100.0)
 NAMED = {"life": "", "state": "normal", "if_disputed": "normal"}
 
 
-def test_lists_are_worst_first_and_pages_join_without_gap_or_repeat(database: Database) -> None:
-    ranks = {"a": 0.5, "b": -1.0, "c": 0.5, "d": float("inf"), "e": 0.25}
+def test_what_needs_somebody_comes_first_and_pages_join_without_gap_or_repeat(database: Database) -> None:
+    """By state, then by a raised alarm, an ended life last; among equals by rank, then by name."""
+    listed = {
+        "a": ("normal", 0.5), "b": ("normal", -1.0), "c": ("normal", 0.5), "d": ("failure", 99.0), "e": ("check", 0.25),
+        "f": ("failure", 100.0), "g": ("failure", 3.0), "h": ("normal", 7.0), "i": ("normal", 8.0), "j": ("check", 1.0),
+    }  # fmt: skip
     with database.writing() as connection:
-        for clutch_id, rank in ranks.items():
-            clutches.insert(connection, clutch_row(clutch_id, rank=rank))
+        for clutch_id, (state, rank) in listed.items():
+            clutches.insert(connection, replace(clutch_row(clutch_id, rank=rank), state=state))
+        for clutch_id in ("h", "i", "j", "g"):
+            event = EventRow(
+                event_id=clutch_id,
+                alarm_id="a",
+                clutch_id=clutch_id,
+                quantity="health",
+                mark="",
+                content={},
+                raised_at="",
+            )
+            alarms.insert_event(connection, event)
+        alarms.acknowledge(connection, "i", at="2026-01-01", by="me", note="")
+        order = ByNeed(states=["failure", "check"], over=100.0)
         seen: list[str] = []
-        after = None
-        while page := clutches.page(connection, limit=2, after=after):
+        while page := clutches.page(connection, limit=3, left_out=len(seen), by_need=order):
             seen += [row.clutch_id for row in page]
-            after = (page[-1].rank, page[-1].clutch_id)
-        assert seen == ["b", "e", "a", "c", "d"]
-        assert clutches.all_ids(connection) == ["a", "b", "c", "d", "e"]
+        assert "".join(seen) == "gdejhbacif"
+        assert clutches.all_ids(connection) == [*"abcdefghij"]
 
 
 def test_archived_clutches_are_listed_apart(connection: Connection) -> None:
@@ -35,7 +53,7 @@ def test_archived_clutches_are_listed_apart(connection: Connection) -> None:
     assert [row.clutch_id for row in clutches.page(connection, limit=9)] == ["other"]
     (row,) = clutches.page(connection, ClutchSelection(archived=True), limit=9)
     assert (row.clutch_id, row.record, row.registered) == (CLUTCH, {"fluid": "new"}, {"fluid": "old"})
-    assert clutches.page(connection, ClutchSelection(archived=True), limit=9, after=(row.rank, CLUTCH)) == []
+    assert clutches.page(connection, ClutchSelection(archived=True), limit=9, after=CLUTCH) == []
 
 
 def test_a_clutch_comes_back_as_it_was_stored_once_and_its_summary_and_revision_change(connection: Connection) -> None:
@@ -89,8 +107,8 @@ def fleet(database: Database) -> Database:
     return database
 
 
-def ids(database: Database, choice: ClutchSelection = IN_USE, *, by_name: bool = False) -> list[str]:
-    return [row.clutch_id for row in read_from(database, clutches.page, choice, limit=9, by_name=by_name)]
+def ids(database: Database, choice: ClutchSelection = IN_USE, *, by_need: ByNeed | None = BY_RANK) -> list[str]:
+    return [row.clutch_id for row in read_from(database, clutches.page, choice, limit=9, by_need=by_need)]
 
 
 @pytest.mark.parametrize(
@@ -116,24 +134,23 @@ def ids(database: Database, choice: ClutchSelection = IN_USE, *, by_name: bool =
 )
 def test_a_choice_is_listed_and_counted(fleet: Database, choice: ClutchSelection, worst_first: list[str]) -> None:
     assert ids(fleet, choice) == worst_first
-    assert ids(fleet, choice, by_name=True) == sorted(worst_first)
+    assert ids(fleet, choice, by_need=None) == sorted(worst_first)
     counts = read_from(fleet, clutches.counts, choice)
     states = [FLEET[clutch_id][1] for clutch_id in worst_first]
     held = [clutch_id for clutch_id in worst_first if clutch_id in ("b-3", "gone")]
     assert counts == Counts(states={state: states.count(state) for state in set(states)}, held=len(held))
 
 
-def test_a_walk_by_name_meets_each_clutch_once_while_ranks_change_and_one_worst_first_does_not(fleet: Database) -> None:
+def test_a_walk_by_name_meets_each_clutch_once_while_ranks_change_and_one_by_need_does_not(fleet: Database) -> None:
     def walked(by_name: bool) -> list[str]:
         seen: list[str] = []
-        place = None
         for _ in range(6):
             with fleet.writing() as connection:
-                page = clutches.page(connection, limit=1, after=place, by_name=by_name)
+                place = {"after": seen[-1] if seen else ""} if by_name else {"left_out": len(seen), "by_need": BY_RANK}
+                page = clutches.page(connection, limit=1, **place)
                 if not page:
                     break
                 seen.append(page[0].clutch_id)
-                place = page[0].rank, page[0].clutch_id
                 # the clutch that was seen falls behind all others, and the last of the list comes to its front
                 clutches.set_summary(connection, page[0].clutch_id, 20.0 + len(seen), {}, **NAMED)
                 clutches.set_summary(connection, "c-4", -float(len(seen)), {}, **NAMED)
@@ -149,7 +166,7 @@ def test_a_part_of_a_list_the_clutch_at_a_share_of_the_ranks_and_what_an_edit_ch
     whole = ids(fleet)
     with fleet.reading() as connection:
         for left_out in range(5):
-            part = clutches.page(connection, limit=2, left_out=left_out)
+            part = clutches.page(connection, limit=2, left_out=left_out, by_need=BY_RANK)
             assert [row.clutch_id for row in part] == whole[left_out : left_out + 2]
 
         def at(share: float, choice: ClutchSelection = IN_USE, below: float = 9.0) -> str | None:

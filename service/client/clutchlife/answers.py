@@ -18,6 +18,8 @@ from typing import Any
 
 import httpx2
 
+from .notebook import as_html
+
 #: Statuses below 500 that pass by themselves: a slow request, one that came too early, too many of them.
 _TRANSIENT = (408, 425, 429)
 #: Statuses that hold for every run of a clutch: no key, no permission, no such clutch or address, a proxy's key; 0 is an
@@ -108,13 +110,20 @@ def perhaps_stored(response: httpx2.Response) -> bool:
     return response.status_code not in _STORED_NOTHING
 
 
-def content(response: httpx2.Response) -> dict[str, Any] | None:
+class ServiceAnswer(dict[str, Any]):
+    """A JSON object as the service sent it; a notebook shows it as a table."""
+
+    def _repr_html_(self) -> str:
+        return as_html(self)
+
+
+def content(response: httpx2.Response) -> ServiceAnswer | None:
     """The JSON object of an answer; None where it holds none."""
     try:
         answer = response.json()
     except (ValueError, RecursionError):
         return None
-    return answer if isinstance(answer, dict) else None
+    return ServiceAnswer(answer) if isinstance(answer, dict) else None
 
 
 def csv(response: httpx2.Response) -> str | None:

@@ -62,7 +62,7 @@ class Client:
     # --- clutches ---
 
     def clutches(self, **arguments: Any) -> Any:
-        """All clutches as a table, worst first, with state and remaining life; `archived=True`: the archived ones."""
+        """All clutches as a table, what needs somebody first; `archived=True`: the archived ones."""
         return self._table("/v1/clutches", **arguments)
 
     def clutch(self, clutch_id: str) -> Answer:

@@ -72,7 +72,7 @@ async def list_clutches(
     sort: Sort = "worst",
     offset: Offset = 0,
 ) -> Response:
-    """The clutches of the key, with health and remaining life: the lowest safe bound first, or by name. To read all
+    """The clutches of the key, with health and remaining life: what needs somebody first, or by name. To read all
     of them, sort by name: then none is missed or repeated.
     """
     choice = ClutchSelection(archived=archived, only=auth.grant_of(request).clutches, state=state, held=held, find=find)

@@ -107,7 +107,9 @@ def test_a_fleet_is_refreshed_and_scored_beside_the_service(server: Server) -> N
     assert after.json()["prior"] == {"name": "fleet", "version": 1, "clutches": 3}
     assert after.json()["revision"] == before.json()["revision"] + 1
     assert "version 1, 3 clutches" in clutchlife("fleet", *database)
-    assert "predictions updated" not in clutchlife("fleet", "refresh", *database)
+    for where in (database, ("--url", server.url)):
+        assert "predictions updated" not in clutchlife("fleet", "refresh", *where)
+        assert "version 1, 3 clutches" in clutchlife("fleet", *where)
     output = clutchlife("score", *database)
     scores = http.get("/v1/fleet/scores").json()
     assert len(scores["lives"]) >= 2

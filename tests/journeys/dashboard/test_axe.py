@@ -57,7 +57,7 @@ def test_the_fleet(browser: Browser, url: str, scheme: str, viewport: dict[str, 
     watched = Watched(browser, url, color_scheme=scheme, viewport=viewport)
     page = watched.open("/")
     page.locator("table.fleet tbody tr").first.wait_for()
-    page.get_by_role("link", name="1 run held").wait_for()
+    page.get_by_role("link", name="one held run").wait_for()
     assert violations(page) == []
     page.get_by_role("button", name="Register a clutch").click()
     page.get_by_role("dialog", name="Register a clutch").wait_for()

@@ -147,7 +147,7 @@ def test_a_typo_is_seen_corrected_and_undone(watched: Watched, server: Server) -
     expect(listed).to_contain_text("Held")
     assert life(server) == before
     page.goto(server.url)
-    page.locator("tr[data-clutch='bench']").get_by_role("link", name="1 run held").click()
+    page.locator("tr[data-clutch='bench']").get_by_role("link", name="one held run").click()
     settled(page, 1)
 
     warned = page.locator("#warnings li").filter(has_text="Runs are held")

@@ -58,7 +58,7 @@ def test_a_diagnosis_is_run_adopted_and_taken_back(watched: Watched, server: Ser
     page.goto(f"{server.url}/")
     row = page.locator("tr[data-clutch='bench']")
     expect(row).to_contain_text("Out of specification")
-    expect(row.locator("td[data-label='Diagnosis']")).to_contain_text("Cause named")
+    expect(row.locator(".do")).to_contain_text("it explains where data and model disagree")
 
 
 def adopt(page: Page, *, agree: bool) -> None:
@@ -89,12 +89,10 @@ def test_a_rebuild_ends_what_a_diagnosis_said(watched: Watched, server: Server) 
     page = watched.open("/")
     row = page.locator("tr[data-clutch='bench']")
     expect(row).to_contain_text("Out of specification")
-    expect(row).not_to_contain_text("before the rebuild")
     post(server.http, "bench", {"kind": "maintenance", "cycles": 5000, "event": "rebuild"})
     for cycles in (5100, 6000, 7000):
         post(server.http, "bench", stationary(cycles, wear=(cycles - 5000) / 26_000))
     expect(row).to_contain_text("Normal")
-    expect(row.locator("td[data-label='Diagnosis']")).to_contain_text("before the rebuild")
     watched.open("/clutches/bench#/diagnosis")
     page.locator("#diagnosis").get_by_text("which concerns the earlier life").wait_for()
     expect(page.locator("#head .verdict")).to_contain_text("Normal")

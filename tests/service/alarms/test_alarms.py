@@ -56,7 +56,7 @@ def at_least(client: TestClient) -> float:
 
 def test_a_posted_run_raises_an_alarm_once_and_not_again_when_it_is_acknowledged(life: TestClient) -> None:
     limit = at_least(life) - 1
-    rule(life, quantity="remaining_cycles", probability=0.05, below=limit)
+    rule(life, quantity="remaining_cycles", probability=0.05, below=limit, median_within=None)
     assert events(life) == []
     for cycles in (3500, 4000):
         post_run(life, {"kind": "duty_cycles", "cycles": cycles, "duty": {"cycles": 500}}, "e")
@@ -130,10 +130,10 @@ def test_an_acknowledged_alarm_goes_on_where_an_end_is_taken_back(life: TestClie
 
 def test_it_is_cleared_by_the_hysteresis_and_raised_again(life: TestClient) -> None:
     value = at_least(life)
-    made = rule(life, quantity="remaining_cycles", below=value + 1, hysteresis=0.0)
+    made = rule(life, quantity="remaining_cycles", below=value + 1, hysteresis=0.0, median_within=None)
     (raised,) = events(life, state="raised")
     address = f"/v1/alarms/{made['alarm_id']}"
-    body = {name: made[name] for name in ("clutch_id", "quantity")}
+    body = {name: made[name] for name in ("clutch_id", "quantity", "median_within")}
     # the value lies above the new limit, and within its hysteresis
     assert life.put(address, json=body | {"below": value - 1, "hysteresis": 0.5}).status_code == 200
     assert [event["event_id"] for event in events(life, state="raised")] == [raised["event_id"]]
@@ -141,6 +141,33 @@ def test_it_is_cleared_by_the_hysteresis_and_raised_again(life: TestClient) -> N
     assert events(life, state="open") == []
     life.put(address, json=body | {"below": value + 1})
     assert [event["state"] for event in events(life)] == ["raised", "cleared"]
+
+
+def test_a_bound_calls_only_where_the_tests_show_the_end_and_again_on_the_way_to_it(
+    client: TestClient, receiver: Receiver
+) -> None:
+    """A life that ends at 13,000 cycles, with a limit of 4,000. After three tests the safe bound alone is below it."""
+    body = {"url": receiver.url, "secret": SECRET, "cleared": True}
+    assert client.post("/v1/webhooks", json=body).status_code == 201
+    client.post("/v1/clutches", json={"clutch_id": "e"})
+    rule(client, quantity="remaining_cycles", below=4000)
+    rule(client, quantity="remaining_cycles", below=4000, median_within=None, name="bound alone")
+    called: dict[float, list[str]] = {}
+    for cycles in range(0, 13_001, 1000):
+        post_run(client, stationary(cycles, wear=cycles / 26_000), "e")
+        called[cycles] = [event["message"] for event in events(client, state="raised") if event["name"] == ""]
+        if cycles == 2000:
+            assert [event["name"] for event in events(client)] == ["bound alone"]
+        for event in events(client, state="raised"):
+            client.post(f"/v1/alarms/events/{event['event_id']}/acknowledge", json={"note": "seen"})
+    first, *others = raised_at = [cycles for cycles, messages in called.items() if messages]
+    assert 5000 <= first <= 11_000, "not after three tests, and not late"
+    assert 1 <= len(others) <= len(rules.STEPS)
+    messages = [called[cycles][0] for cycles in raised_at]
+    assert all("(95 %), 50 % chance of " in message or "no further cycle" in message for message in messages)
+    assert [share for share in ("50 %", "25 %") if f"less than {share} of it is left" in "".join(messages)]
+    until(lambda: len(receiver.bodies) >= 2 * len(messages))
+    assert {sent["type"] for sent in receiver.bodies} == {"alarm.raised"}, "what takes another's place is not over"
 
 
 @pytest.mark.parametrize(
@@ -203,7 +230,7 @@ def test_days_are_counted_at_the_pace_of_the_runs(client: TestClient) -> None:
     (raised,) = events(client)
     assert raised["value"] == pytest.approx(at_least(client) / 1000, rel=1e-6)
     last = f"{len(CYCLES)} Jan 2026"
-    assert f"days at the pace so far, counted from the last run on {last} (limit: 1,000 days)" in raised["message"]
+    assert f"days at the pace so far, counted from the last run on {last} (limit: 1,000 days; less" in raised["message"]
 
 
 def test_a_new_verdict_is_an_alarm(life: TestClient) -> None:

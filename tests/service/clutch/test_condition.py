@@ -91,8 +91,10 @@ def test_two_tests_say_at_least_how_many_cycles_are_left(bench: Bench) -> None:
 
 @pytest.mark.parametrize(
     ("at_least", "words"),
-    [(None, "no further cycle is safe"), (0.99, "no further cycle is safe"), (1.9, "safe for 1 more cycle (95 %)"),
-     (9.9, "safe for 9 more cycles (95 %)"), (99.9, "safe for 99 more cycles (95 %)"),
+    [(None, "no further cycle is safe"), (0.99, "no further cycle is safe"),
+     (1.9, "safe for fewer than 10 more cycles (95 %)"),
+     (9.9, "safe for fewer than 10 more cycles (95 %)"), (99.9, "safe for 99 more cycles (95 %)"),
+     (10.0, "safe for 10 more cycles (95 %)"),
      (100.0, "safe for 100 more cycles (95 %)"), (1099.0, "safe for 1,000 more cycles (95 %)"),
      (12_999.0, "safe for 12,000 more cycles (95 %)")],
 )  # fmt: skip
@@ -202,6 +204,10 @@ def advising(test: str, effect: str) -> LatestDiagnosis:
         (
             summary(9000.0, current={"health": 0.05}), None,
             "Maintenance required: near its limit, slope, 100 rpm, 5 bar below 0", "Replace soon.",
+        ),
+        (
+            summary(9000.0, current={"health": 0.12}), None,
+            "Normal: safe for 9,000", "Carry on testing with a replacement at hand: health 12 %.",
         ),
         (summary(900.0, pace=PACE), None, "Maintenance required: ", "Replace within less than a day at the pace so far"),
         (summary(0.4, pace=PACE), None, "Maintenance required: ", "Replace now."),

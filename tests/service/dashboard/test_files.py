@@ -153,8 +153,9 @@ MODULES = {name: LOADED.by_name[name].body.decode() for name in LOADED.by_name i
 
 
 def imported(name: str) -> list[str]:
-    """The modules that a module imports, by their names in the tree."""
+    """The modules that a module imports, at once or when they are needed, by their names in the tree."""
     paths = re.findall(r'^(?:import|export)\b[^;]*?from "([^"]+)";', MODULES[name], re.MULTILINE)
+    paths += re.findall(r'(?<=[ (])import\("([^"]+)"\)', MODULES[name])
     assert all(path.startswith(("./", "../")) for path in paths), "only relative imports are found below a content hash"
     return [normpath(PurePosixPath(name).parent / path) for path in paths]
 
@@ -180,6 +181,16 @@ def test_every_module_is_loaded_by_a_page() -> None:
             reached.add(name)
             waiting += imported(name)
     assert reached == set(MODULES)
+
+
+def test_the_start_page_loads_no_chart_and_nothing_that_sends() -> None:
+    """They are loaded when they are needed: half of what the page loaded before."""
+    first = {"fleet/fleet.js", *LOADED.imported("fleet/fleet.js")}
+    assert {name.split("/")[0] for name in first} <= {"fleet", "shared", "alarms", "sending"}
+    assert first & {name for name in MODULES if name.startswith(("alarms/", "sending/"))} == {
+        "alarms/raised.js",
+        "sending/taking.js",
+    }
 
 
 # --- `/help`: the built site, or how to build it.

@@ -8,19 +8,21 @@ import { rowFiles } from "../shared/files.js";
 import { moment } from "../shared/format.js";
 import { problemView } from "../shared/problem_view.js";
 import { askReceiver, askRule, ruleText } from "./form.js";
+import { askAcknowledge } from "./raised.js";
 
-/** Events that are shown; the list of the API holds all. */
+/** Events that are shown, and deliveries of each receiver; the lists of the API hold all. */
 const SHOWN = 50;
+const DELIVERIES = 10;
 /** @type {Record<EventOut["state"], string>} */
 const STATES = { raised: "Not acknowledged", acknowledged: "Acknowledged", cleared: "Over" };
 
 /** @type {(place: HTMLElement, clutchId: string | null) => () => Promise<void>} of all clutches where it is null */
 export function alarms(place, clutchId) {
-  const wrong = h("div", { role: "status" });
+  const [rulesStatus, receiversStatus] = [h("div", { role: "status" }), h("div", { role: "status" })];
   const events = h("section", { "aria-label": "Alarms" });
   const rules = h("section", { "aria-label": "Rules" });
   const receivers = h("section", { "aria-label": "Receivers" });
-  place.replaceChildren(wrong, events, rules, receivers);
+  place.replaceChildren(events, rules, receivers);
   let shown = "";
 
   async function show() {
@@ -31,33 +33,47 @@ export function alarms(place, clutchId) {
       readAll("/v1/alarms?limit=1000"),
       readAll("/v1/webhooks?limit=1000"),
     ]);
-    const text = JSON.stringify([body.items, allRules.items, allReceivers.items]);
-    if (text === shown) return;
-    shown = text;
     const own = (/** @type {{ clutch_id: string | null }} */ { clutch_id: id }) =>
       clutchId === null || id === null || id === clutchId;
+    const ownReceivers = allReceivers.items.filter(own);
+    /** @type {{ body: { items: DeliveryOut[] } }[]} */
+    const sent = await Promise.all(
+      ownReceivers.map(({ webhook_id: id }) => read(`/v1/webhooks/${id}/deliveries?limit=${DELIVERIES}`)),
+    );
+    const deliveries = sent.map((each) => each.body.items);
+    const text = JSON.stringify([body.items, allRules.items, ownReceivers, deliveries]);
+    if (text === shown) return;
+    shown = text;
     drawEvents(body.items);
     drawRules(allRules.items.filter(own));
-    drawReceivers(allReceivers.items.filter(own));
+    drawReceivers(ownReceivers, deliveries);
   }
 
   /** @param {EventOut[]} raised */
   function drawEvents(raised) {
-    const acknowledge = (/** @type {EventOut} */ { event_id: id }) =>
-      told("POST", `/v1/alarms/events/${id}/acknowledge`, { note: "" });
+    const acknowledge = async (/** @type {EventOut} */ event) => (await askAcknowledge(event)) && show();
     const rows = raised.map((event) => [
       moment(event.raised_at),
       h("a", { href: `/clutches/${encodeURIComponent(event.clutch_id)}` }, event.clutch_id),
       event.message,
-      event.state === "acknowledged" ? `Acknowledged by ${event.acknowledged_by ?? ""}` : STATES[event.state],
-      event.state === "raised" && act("Acknowledge", () => acknowledge(event), event.message),
+      event.state === "acknowledged" ? acknowledgedText(event) : STATES[event.state],
+      event.state === "raised" && act("Acknowledge …", () => acknowledge(event), event.message),
     ]);
     const columns = ["Raised", "Clutch", "What", "State", "Action"];
     events.replaceChildren(
       ...listed("Alarms", "No alarm has been raised.", table("Alarms, the newest first", columns, rows)),
       rowFiles("alarms", [
-        ["raised at", "clutch", "message", "state", "acknowledged by", "value", "limit"],
-        ...raised.map((e) => [e.raised_at, e.clutch_id, e.message, e.state, e.acknowledged_by, e.value, e.limit]),
+        ["raised at", "clutch", "message", "state", "acknowledged by", "note", "value", "limit"],
+        ...raised.map((e) => [
+          e.raised_at,
+          e.clutch_id,
+          e.message,
+          e.state,
+          e.acknowledged_by,
+          e.note,
+          e.value,
+          e.limit,
+        ]),
       ]),
     );
   }
@@ -67,7 +83,7 @@ export function alarms(place, clutchId) {
     const rows = own.map((rule) => {
       const text = ruleText(rule);
       const path = `/v1/alarms/${rule.alarm_id}`;
-      const test = act("Test", async () => say(await told("POST", `${path}/test`, {})), text);
+      const test = act("Test", () => tested(path, rulesStatus), text);
       const change = act("Change …", () => changed(rule), text);
       return [
         [rule.name && h("b", `${rule.name}: `), text, !rule.enabled && h("span.tag", "off")],
@@ -76,64 +92,94 @@ export function alarms(place, clutchId) {
           "div.row.buttons.start",
           test,
           change,
-          act("Delete", () => told("DELETE", path), text),
+          act("Delete", () => told("DELETE", path, rulesStatus), text),
         ),
       ];
     });
     const all = table("Rules", ["An alarm when", "Of", "Action"], rows);
     rules.replaceChildren(
       ...listed("Rules", "No rule yet: nothing raises an alarm.", all),
+      rulesStatus,
       button("New rule …", () => changed(null), { class: "main" }),
     );
   }
 
-  /** @param {WebhookOut[]} own */
-  function drawReceivers(own) {
-    const rows = own.map(({ webhook_id: id, name, url, clutch_id: of }) => [
-      name || "–",
-      url,
-      of ?? "all clutches",
-      act("Delete", () => told("DELETE", `/v1/webhooks/${id}`), url),
-    ]);
-    const add = async () => {
-      const receiver = await askReceiver(clutchId);
-      if (receiver !== null) await told("POST", "/v1/webhooks", receiver);
-    };
-    const all = table("Receivers", ["Name", "Address", "Of", "Action"], rows);
+  /** @type {(own: WebhookOut[], deliveries: DeliveryOut[][]) => void} `deliveries`: the newest of each, the newest first */
+  function drawReceivers(own, deliveries) {
+    const rows = own.map(({ webhook_id: id, name, url, clutch_id: of }, index) => {
+      const path = `/v1/webhooks/${id}`;
+      return [
+        name || "–",
+        url,
+        of ?? "all clutches",
+        deliveries[index].length > 0 ? deliveriesView(url, deliveries[index]) : "nothing sent yet",
+        h(
+          "div.row.buttons.start",
+          act("Test", () => tested(path, receiversStatus), url),
+          act("Delete", () => told("DELETE", path, receiversStatus), url),
+        ),
+      ];
+    });
+    const all = table("Receivers", ["Name", "Address", "Of", "Deliveries", "Action"], rows);
     receivers.replaceChildren(
       ...listed("Receivers", "No receiver yet: alarms appear on this page only.", all),
-      button("New receiver …", add),
+      receiversStatus,
+      button("New receiver …", async () => (await askReceiver(clutchId)) && show()),
     );
   }
 
   /** @type {(label: string, onclick: () => unknown, of: string) => HTMLButtonElement} `of`: what it is done to */
   const act = (label, onclick, of) => button(label, onclick, { class: "small", "aria-label": `${label}: ${of}` });
 
-  /** @param {{ body: TestedOut } | null} tested */
-  const say = (tested) => tested && wrong.replaceChildren(h("p.notice", tested.body.message));
-
-  /** @param {AlarmOut | null} rule null: a new one */
-  async function changed(rule) {
-    const wanted = await askRule(rule, clutchId);
-    if (wanted === null) return;
-    if (rule === null) await told("POST", "/v1/alarms", wanted);
-    else await told("PUT", `/v1/alarms/${rule.alarm_id}`, wanted);
+  /** @type {(path: string, status: HTMLElement) => Promise<void>} send a test, and say how it went */
+  async function tested(path, status) {
+    status.replaceChildren(quiet("Sending a test …"));
+    const answer = await told("POST", `${path}/test`, status);
+    if (answer) status.replaceChildren(h("p.notice", answer.body.message));
   }
 
-  /** @type {(method: string, path: string, body?: object) => Promise<any>} null where it was refused, which is said */
-  async function told(method, path, body = {}) {
-    wrong.replaceChildren();
+  /** @param {AlarmOut | null} rule null: a new one */
+  const changed = async (rule) => (await askRule(rule, clutchId)) && show();
+
+  /** @type {(method: string, path: string, status: HTMLElement) => Promise<any>} null where it was refused, which `status` says */
+  async function told(method, path, status) {
     try {
-      const answer = await send(method, path, body);
+      const answer = await send(method, path, {});
+      status.replaceChildren();
       await show();
       return answer;
     } catch (problem) {
-      wrong.replaceChildren(problemView(problem, "Nothing was changed. "));
+      status.replaceChildren(problemView(problem, "Nothing was changed. "));
       return null;
     }
   }
 
   return show;
+}
+
+/** @param {EventOut} event */
+const acknowledgedText = ({ acknowledged_by: by, note }) => `Acknowledged by ${by ?? ""}${note && `: ${note}`}`;
+
+/** @type {(url: string, sent: DeliveryOut[]) => HTMLElement} how the newest went, and all of them below */
+function deliveriesView(url, sent) {
+  const rows = sent.map((each) => [
+    moment(each.created_at),
+    each.event_id === null ? "Test" : "Alarm",
+    deliveryText(each),
+  ]);
+  return h(
+    "details",
+    h("summary", deliveryText(sent[0])),
+    table(`Deliveries to ${url}`, ["Made", "What", "State"], rows),
+  );
+}
+
+/** @param {DeliveryOut} delivery */
+function deliveryText({ state, attempts, problem, delivered_at: at, next_attempt_at: next }) {
+  if (state === "delivered") return `Delivered ${moment(at)}`;
+  const reason = problem ? `: ${problem}` : "";
+  if (state === "failed") return `Failed${reason}`;
+  return `Waiting after ${attempts} ${attempts === 1 ? "attempt" : "attempts"}${reason}${next ? `; next ${moment(next)}` : ""}`;
 }
 
 /** @type {(title: string, empty: string, all: HTMLTableElement) => HTMLElement[]} a heading, and the rows or that there are none */

@@ -1,7 +1,7 @@
 // What a rule of an alarm watches, a rule as part of a sentence, and the questions of the alarms' page: a rule, a receiver. Each
-// resolves to what is to be sent, null where it is left.
+// sends what is typed, which stays where the service refuses it.
 
-import { Problem } from "../shared/api.js";
+import { Problem, send } from "../shared/api.js";
 import { asked } from "../shared/dialog.js";
 import { field, h, select } from "../shared/dom.js";
 import { fixed, NOT_A_NUMBER, numberOf, percent, significant, words } from "../shared/format.js";
@@ -22,17 +22,29 @@ export const WATCHED = {
 };
 
 /** @type {(rule: AlarmOut) => string} when a rule raises an alarm */
-export function ruleText({ quantity, below, above, probability, any_of: names }) {
+export function ruleText({ quantity, below, above, probability, any_of: names, median_within: within }) {
   const { title, side, unit } = WATCHED[quantity];
   if (side === null) return names ? `${title} (${names.map((name) => words(name).toLowerCase()).join(", ")})` : title;
   const limit = below ?? above ?? 0;
   const value = Math.abs(limit) >= 100 ? fixed(limit) : significant(limit, 3);
   const sure = probability === 0.05 ? "" : `, ${percent(probability)} quantile`;
-  return `${title} ${side} ${value}${unit && ` ${unit}`}${sure}`;
+  const shown = hasMedian(quantity) && within !== null ? `, median below ${within} times that` : "";
+  return `${title} ${side} ${value}${unit && ` ${unit}`}${sure}${shown}`;
 }
 
-/** @type {(id: string, value: string) => HTMLInputElement} */
-const input = (id, value) => h("input", { id, value });
+/** @type {(quantity: string) => boolean} remaining life has a median beside its bound */
+const hasMedian = (quantity) => quantity.startsWith("remaining");
+
+/** @type {(name: string, value: string) => HTMLInputElement} `name`: of the field that is sent */
+const input = (name, value) => h("input", { id: `alarm-${name}`, name, value });
+
+/** @type {(input: HTMLInputElement) => number | null} what is typed; a Problem at the field where it is no number */
+function typed({ name, value }) {
+  const number = numberOf(value);
+  if (number !== undefined) return number;
+  const error = { pointer: `/${name}`, message: NOT_A_NUMBER, row: null, value };
+  throw new Problem(422, { detail: NOT_A_NUMBER, errors: [/** @type {ProblemError} */ (error)] });
+}
 
 /**
  * @param {AlarmOut | null} rule null: a new one
@@ -42,18 +54,22 @@ export function askRule(rule, clutchId) {
   const first = rule?.quantity ?? "remaining_cycles";
   const options = Object.entries(WATCHED).map(([name, { title }]) => /** @type {[string, string]} */ ([name, title]));
   const quantity = select({ id: "alarm-quantity" }, options, first);
-  const limit = input("alarm-limit", String(rule?.below ?? rule?.above ?? WATCHED[first].limit));
-  const share = input("alarm-hysteresis", String(100 * (rule?.hysteresis ?? 0.1)));
-  const name = input("alarm-name", rule?.name ?? "");
-  const clutch = input("alarm-clutch", rule ? (rule.clutch_id ?? "") : (clutchId ?? ""));
+  const limit = input("limit", String(rule?.below ?? rule?.above ?? WATCHED[first].limit));
+  const share = input("hysteresis", String(100 * (rule?.hysteresis ?? 0.1)));
+  const within = input("median_within", String((rule ? rule.median_within : 2) ?? ""));
+  const name = input("name", rule?.name ?? "");
+  const clutch = input("clutch_id", rule ? (rule.clutch_id ?? "") : (clutchId ?? ""));
   const enabled = h("input", { id: "alarm-enabled", type: "checkbox", checked: rule?.enabled ?? true });
   const limits = h("div.fields");
   const watched = () => WATCHED[/** @type {Watched} */ (quantity.value)];
   const draw = () => {
     const { side, unit } = watched();
     limits.hidden = side === null;
+    limit.name = side ?? "";
+    const about = h("small", "With few tests the bound is low and the median high. Empty: the bound alone decides.");
     limits.replaceChildren(
       field(limit, `${side === "above" ? "Above" : "Below"}${unit && `, ${unit}`}`),
+      hasMedian(quantity.value) ? field(within, "… and the median below so many times that", about) : "",
       field(share, "Hysteresis, % of the limit: the alarm ends when the value is within the limit by this much"),
     );
   };
@@ -69,36 +85,35 @@ export function askRule(rule, clutchId) {
     field(name, "Name (optional)"),
     h("label.switch", enabled, "In use"),
   ];
-  const send = () => {
+  const save = () => {
     const { side } = watched();
-    const [at, back] = [numberOf(limit.value), numberOf(share.value)];
-    if (side !== null && (typeof at !== "number" || typeof back !== "number")) {
-      throw new Problem(422, { detail: NOT_A_NUMBER });
-    }
-    return {
+    const body = {
       name: name.value.trim(),
       quantity: quantity.value,
-      ...(side === null ? {} : { [side]: at, hysteresis: (back ?? 0) / 100 }),
+      ...(side === null ? {} : { [side]: typed(limit), hysteresis: (typed(share) ?? 0) / 100 }),
+      ...(hasMedian(quantity.value) ? { median_within: typed(within) } : {}),
       ...(clutch.value.trim() ? { clutch_id: clutch.value.trim() } : {}),
       ...(rule
         ? { probability: rule.probability, speed_rpm: rule.speed_rpm, any_of: rule.any_of, kind: rule.kind }
         : {}),
       enabled: enabled.checked,
     };
+    return rule ? send("PUT", `/v1/alarms/${rule.alarm_id}`, body) : send("POST", "/v1/alarms", body);
   };
-  return asked({ title: rule === null ? "New rule" : "Change the rule", fields, action: "Save", send });
+  return asked({ title: rule === null ? "New rule" : "Change the rule", fields, action: "Save", send: save });
 }
 
 /** @param {string | null} clutchId of a clutch's page */
 export function askReceiver(clutchId) {
-  const url = h("input", { id: "receiver-url", type: "text", required: true });
-  const name = input("receiver-name", "");
+  const url = h("input", { id: "receiver-url", name: "url", type: "text", required: true });
+  const name = input("name", "");
   const about = "https:// for a signed webhook; with the extra notify also mailtos://, msteams://, slack://, ntfys://";
   const fields = [field(url, "Address", h("small", about)), field(name, "Name (optional)")];
-  const send = () => ({
-    url: url.value.trim(),
-    name: name.value.trim(),
-    ...(clutchId === null ? {} : { clutch_id: clutchId }),
-  });
-  return asked({ title: "New receiver", fields, action: "Save", send });
+  const save = () =>
+    send("POST", "/v1/webhooks", {
+      url: url.value.trim(),
+      name: name.value.trim(),
+      ...(clutchId === null ? {} : { clutch_id: clutchId }),
+    });
+  return asked({ title: "New receiver", fields, action: "Save", send: save });
 }

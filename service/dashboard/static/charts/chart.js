@@ -41,7 +41,7 @@ export class Chart {
     this.stale = false;
     this.visible = false;
     this.turn = 0;
-    this.note = h("p.note", "Being computed …");
+    this.note = h("p.note", "Reading what it shows …");
     this.controls = h("div.row.controls");
     this.ask = button("Draw it (loads 1.4 MB once)", want, { class: "small", hidden: true });
     const style = { "min-height": `${height}px` };

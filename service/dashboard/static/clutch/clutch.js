@@ -4,10 +4,11 @@
 
 import { diagnosisTab } from "../diagnosis/diagnosis.js";
 import { alarms } from "../alarms/alarms.js";
+import { pollRaised } from "../alarms/raised.js";
 import { painted } from "../charts/plotting.js";
 import { engagementsTab } from "../engagements/engagements.js";
-import { sender } from "../sending/sending.js";
-import { Problem, read } from "../shared/api.js";
+import { sender } from "../sending/taking.js";
+import { at, Problem, read } from "../shared/api.js";
 import { button, byId, h, showTab } from "../shared/dom.js";
 import { Live } from "../shared/live.js";
 import { placeUnits } from "../shared/units.js";
@@ -112,17 +113,35 @@ async function poll() {
   if (shown.get(name) === key) await part.poll?.();
   else await part.show(item);
   shown.set(name, key); // after all of it is read: an error midway is made good at the next poll
-  if (name === "overview") await drawReport();
+  await Promise.all([pollRaised(), name === "overview" && drawReport()]);
 }
 
 /** @param {ClutchOut} clutch */
 function drawHead(clutch) {
-  byId("head").replaceChildren(...head(clutch, { archive: () => done(askArchive(ID, true)), end: endOrTakeBack }));
+  const copy = () => registerLike(clutch);
+  const asks = {
+    archive: () => done(askArchive(ID, true)),
+    end: endOrTakeBack,
+    edit: () => done(editRecord(clutch)),
+    copy,
+    refresh,
+  };
+  byId("head").replaceChildren(...head(clutch, asks));
   painted().then(() => performance.mark("head-shown"));
   const back = button("Bring it back …", () => done(askArchive(ID, false)));
   const text = "This clutch is archived: it is not in the list of clutches and accepts no new runs.";
   byId("archived").replaceChildren(clutch.archived ? h("div.notice", h("p", text), back) : "");
   makeReport(byId("report"), { clutch });
+}
+
+/** @type {(clutch: ClutchOut) => Asked} */
+const editRecord = async (clutch) => (await import("../sending/registration.js")).edit(clutch);
+
+/** @param {ClutchOut} clutch */
+async function registerLike(clutch) {
+  const { copyOf, register } = await import("../sending/registration.js");
+  const id = await register("", { record: copyOf(clutch) });
+  if (id !== null) location.assign(at(`/clutches/${encodeURIComponent(id)}`));
 }
 
 async function endOrTakeBack() {

@@ -1,5 +1,6 @@
 // What stands first on a clutch's page: its name, what is known and what to do, both as the service says them.
 
+import { raisedNotices } from "../alarms/raised.js";
 import { limitText, placeText } from "../quantities/criteria.js";
 import { h, menu } from "../shared/dom.js";
 import { fixed, percent, words } from "../shared/format.js";
@@ -7,10 +8,11 @@ import { colourOf, heldText, stateIcon } from "../shared/state.js";
 
 /**
  * @param {ClutchOut} clutch
- * @param {{ archive: () => unknown, end: () => unknown }} asks whether the clutch is to be archived; about its end
+ * @param {{ archive: () => unknown, end: () => unknown, edit: () => unknown, copy: () => unknown, refresh: () => unknown }} asks
+ *   whether the clutch is to be archived; about its end, its record, another like it; for the clutch once more
  * @returns {HTMLElement[]}
  */
-export function head(clutch, { archive, end }) {
+export function head(clutch, { archive, end, edit, copy, refresh }) {
   const { state, headline, action } = clutch;
   const [word, ...rest] = headline.split(": ");
   const simulated = clutch.origin === "simulated" && h("span.tag", "simulated");
@@ -23,6 +25,8 @@ export function head(clutch, { archive, end }) {
         h("h1", clutch.clutch_id, simulated),
         !clutch.archived &&
           menu("More", [
+            { label: "Edit the record …", onclick: edit },
+            { label: "Register another like it …", onclick: copy },
             ...(clutch.summary ? [{ label: ended ? "Take the end back …" : "End of life …", onclick: end }] : []),
             { label: "Archive …", onclick: archive },
           ]),
@@ -36,7 +40,8 @@ export function head(clutch, { archive, end }) {
         clutch.held > 0 && h("a", { href: "#/overview", class: "mark-held" }, heldText(clutch.held)),
       ),
       h("p.action", { id: "action" }, action),
-      h("p.quiet.description", description(clutch)),
+      ...raisedNotices(clutch.alarms, refresh),
+      h("p.quiet.description", description(clutch), clutch.note && `; ${clutch.note}`),
     ),
   ];
 }

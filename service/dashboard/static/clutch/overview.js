@@ -37,8 +37,8 @@ export function overviewTab(place, page) {
   place.append(top, body);
   plannedDuty(more, reader.id);
   const showRemaining = remainingBy(more, reader);
-  /** @type {{ slopes: DegradationItem[] | null, limits: CriterionOutcome[] | null }} null: not computed yet */
-  let tracked = { slopes: null, limits: null };
+  /** @type {{ slopes: DegradationItem[] | null, limits: CriterionOutcome[] | null, counts: boolean }} null: not computed yet */
+  let tracked = { slopes: null, limits: null, counts: false };
   /** @type {{ level?: number }} bar */
   const chosen = {};
   /** @type {Receipt[]} */
@@ -80,7 +80,7 @@ export function overviewTab(place, page) {
   async function readSlopes() {
     /** @type {{ body: { items: DegradationItem[] } }} */
     const { body } = await read(`${reader.path}/degradation?quantity=slope`);
-    tracked = { slopes: body.items, limits: null };
+    tracked = { slopes: body.items, limits: null, counts: false };
     drawShudder();
     const level = slopeLevel();
     if (level === undefined) return;
@@ -89,6 +89,7 @@ export function overviewTab(place, page) {
     const found = own.length > 0 ? own : await readLimits(level);
     if (level !== slopeLevel()) return; // another pressure was chosen meanwhile, and is read next
     tracked.limits = found;
+    tracked.counts = own.length > 0;
     drawShudder();
   }
 
@@ -102,12 +103,12 @@ export function overviewTab(place, page) {
   const slopeLevel = () => usual(levelsOf(tracked.slopes ?? []), chosen.level);
 
   function drawShudder() {
-    const { slopes: all, limits: found } = tracked;
+    const { slopes: all, limits: found, counts } = tracked;
     if (all === null) return;
     const pressure = slopeLevel();
     setControls(shudder, all.length > 0 ? [choose("level", "Pressure", levelOptions(levelsOf(all)), pressure)] : []);
     const items = all.filter((item) => item.pressure_bar === pressure);
-    shudder.show(shudderMargin({ items, limits: found, events }));
+    shudder.show(shudderMargin({ items, limits: found, counts, events }));
   }
 
   return { show, charts: [forecast, shudder] };
@@ -120,6 +121,7 @@ function tiles(clutch, life) {
   const [cof, deviation] = estimate(current.mean_cof, current.mean_cof_sd).split(" ± ");
   const share = current.fraction_of_initial;
   const place = share === null ? `at ${fixed(current.measured_at_cycles)} cycles` : `${percent(share, 1)} of new`;
+  const last = share === null ? null : clutch.recent?.mean_cof.at(-1);
   const used = `${life.runs_used} ${life.runs_used === 1 ? "test" : "tests"} used, ${clutch.runs} runs`;
   const sure = course ? `${probability(course.probability)} sure` : life.runs_used > 2 ? "" : "after three tests";
   const look = { class: "health", style: colourOf(clutch.state.name) };
@@ -130,7 +132,11 @@ function tiles(clutch, life) {
       remaining(life),
       h("small", remainingNotes(life)),
     ),
-    tile("Mean COF", cof, h("small", `${deviation ? `± ${deviation}; ` : ""}${place}`)),
+    tile(
+      share === null ? "Mean COF, measured" : "Mean COF, tracked",
+      cof,
+      h("small", `${deviation ? `± ${deviation}; ` : ""}${place}`, last ? `; last test ${fixed(last, 4)}` : ""),
+    ),
     tile("Duty cycles so far", fixed(life.as_of_cycles), h("small", used)),
     tile("How it ages", course ? COURSES[course.name] : "not known yet", h("small", sure)),
     tile(

@@ -12,7 +12,7 @@ import { stateIcon } from "../shared/state.js";
 const RELEASE = document.querySelector("meta[name=release]")?.getAttribute("content") ?? "";
 const LAST_TESTS = 6;
 const LAST_EVENTS = 6;
-const COLUMNS = ["Cycles", "Test", "Mean COF, mean of pressures", "Fits acceptable"];
+const COLUMNS = ["Cycles", "Test", "Mean COF, measured", "Fits acceptable"];
 
 /**
  * What is known of the clutch; before its overview was read, itself alone.
@@ -80,7 +80,7 @@ function facts(clutch, life) {
     ["Remaining cycles", ["predicted", "may_never_reach"].includes(life.status) ? predicted : words(life.status)],
     ["Health", percent(current.health)],
     [
-      "Mean COF",
+      current.fraction_of_initial === null ? "Mean COF, measured" : "Mean COF, tracked",
       current.fraction_of_initial === null ? cof : `${cof} (${percent(current.fraction_of_initial, 1)} of new)`,
     ],
     ["Threshold", `${fixed(criterion.threshold_mean_cof, 4)} (${percent(criterion.fraction)} of new)`],

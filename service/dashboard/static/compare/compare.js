@@ -2,6 +2,7 @@
 // charts come out, a quantity over the cycles of each life and the Stribeck curves of its states, as measured or normalised to new.
 // Its form changes the address, and the address is what is shown.
 
+import { pollRaised } from "../alarms/raised.js";
 import { Chart, choice } from "../charts/chart.js";
 import { column, CYCLES, KIND } from "../charts/columns.js";
 import { PARAMETER_NAMES } from "../charts/parameters.js";
@@ -195,7 +196,7 @@ function drawForm(lives) {
 let shown = "";
 async function poll() {
   const { lives: entries, quantity, share } = question();
-  const lives = await Promise.all(entries.map((entry) => lifeOf(entry, quantity)));
+  const [lives] = await Promise.all([Promise.all(entries.map((entry) => lifeOf(entry, quantity))), pollRaised()]);
   const text = JSON.stringify([location.search, lives.map(({ answer }) => answer.revision)]);
   if (text === shown) return;
   shown = text;

@@ -2,9 +2,8 @@
 // first, come out. Searching, filtering and sorting are the service's.
 // Open this file first (what is asked for and shown), then rows.js (which rows are drawn) and row.js (one of them).
 
-import { alarms } from "../alarms/alarms.js";
-import { register } from "../sending/registration.js";
-import { sender } from "../sending/sending.js";
+import { pollRaised, showRaised } from "../alarms/raised.js";
+import { sender } from "../sending/taking.js";
 import { at, clutchPath, read, send } from "../shared/api.js";
 import { agreed } from "../shared/dialog.js";
 import { button, byId, h, showTab } from "../shared/dom.js";
@@ -36,7 +35,14 @@ const rows = new Rows(
   () => drawPicked(),
 );
 
-const showAlarms = alarms(byId("tab-alarms"), null);
+/** @type {Promise<() => Promise<void>> | null} the alarms' tab, which is loaded when it is opened */
+let alarmsTab = null;
+async function showAlarms() {
+  alarmsTab ??= import("../alarms/alarms.js").then(({ alarms }) => alarms(byId("tab-alarms"), null));
+  await (
+    await alarmsTab
+  )();
+}
 
 /** What totals and the list are asked for: archived or not, and what is searched for. */
 function wanted() {
@@ -63,7 +69,10 @@ function turn() {
 }
 
 async function poll() {
-  if (turn() === "alarms") return showAlarms();
+  if (turn() === "alarms") {
+    await Promise.all([showAlarms(), pollRaised()]);
+    return;
+  }
   const question = chosen();
   const part = rows.wanted();
   const list = `/v1/clutches?${question}${question && "&"}sort=${SORT.value}&offset=${part.offset}&limit=${part.limit}`;
@@ -79,6 +88,7 @@ async function poll() {
 /** @type {(counted: FleetTotals, items: ClutchOut[], part: Part) => void} `part`: of the list that they are */
 function show(counted, items, part) {
   totals = counted;
+  showRaised(counted.alarms);
   document.getElementById("nothing")?.remove();
   if (counted.all === 0 && !wanted().has("find")) {
     byId("chips").replaceChildren();
@@ -180,6 +190,7 @@ setInterval(updateAges, 15_000);
 const live = new Live(poll, INTERVAL);
 sender(byId("send"), { sent: () => live.now() });
 byId("register").addEventListener("click", async () => {
+  const { register } = await import("../sending/registration.js");
   const id = await register("");
   if (id !== null) location.assign(at(`/clutches/${encodeURIComponent(id)}`));
 });

@@ -1,23 +1,23 @@
-// One clutch in the fleet's table.
+// One clutch in the fleet's table: what it needs first, then what is known of it.
 
+import { raisedLink } from "../alarms/raised.js";
 import { h } from "../shared/dom.js";
-import { age, atLeast, cycles, fixed, kindName, likely, percent, words } from "../shared/format.js";
+import { age, cycles, fixed, kindName, likely, percent, roundedDown, words } from "../shared/format.js";
 import { intervalBar, shareBar, sparkline } from "../shared/sparkline.js";
-import { colourOf, heldText, stateIcon, STATES, VERDICTS } from "../shared/state.js";
+import { colourOf, heldText, stateIcon, STATES } from "../shared/state.js";
 
 /** @import { Content } from "../shared/dom.js" */
-/** @import { StateName } from "../shared/state.js" */
 
 /** @type {[Content, string][]} a column's title and width */
 export const COLUMNS = [
-  [h("span.hidden", "Choose"), "44px"],
-  ["State", "18%"],
-  ["Clutch", "15%"],
-  ["Health", "8%"],
-  ["Remaining cycles", "13.5%"],
-  ["Mean COF over cycles", "15.5%"],
-  ["Last run", "13%"],
-  ["Diagnosis", ""],
+  [h("span.hidden", "Choose"), "38px"],
+  ["State", "196px"],
+  ["Clutch", "170px"],
+  ["What to do", ""],
+  ["Safe for, cycles", "136px"],
+  ["Health", "78px"],
+  ["Trend", "132px"],
+  ["Last run", "120px"],
 ];
 
 /**
@@ -26,29 +26,46 @@ export const COLUMNS = [
  * @param {{ scale: number, group: string | null, chosen: boolean, choose: (chosen: boolean) => void }} options
  */
 export function row(clutch, { scale, group, chosen, choose }) {
-  const { summary, state, held } = clutch;
+  const { state, held, summary, alarms } = clutch;
   const box = h("input", { type: "checkbox", checked: chosen, "aria-label": `Choose ${clutch.clutch_id}` });
   box.addEventListener("change", () => choose(box.checked));
   const address = `/clutches/${encodeURIComponent(clutch.clutch_id)}`;
-  const label = h("span", STATES[state.name], state.name !== "normal" && h("small", state.why));
+  const over = clutch.archived || Boolean(summary?.ended);
+  const why = state.name === "normal" && !summary?.ended ? null : state.why;
   return h(
     "tr",
-    { role: "row", "data-clutch": clutch.clutch_id, class: group === null ? null : "begins" },
-    cell("", box),
-    cell("State", h("span.state", stateIcon(state.name), label)),
+    {
+      role: "row",
+      "data-clutch": clutch.clutch_id,
+      class: `${group === null ? "" : "begins "}${over ? "over" : ""}`,
+    },
+    cell("box", {}, box),
+    cell("state", { title: state.why }, stateIcon(state.name), h("span", STATES[state.name])),
     h(
       "th",
-      { role: "rowheader", scope: "row", "data-label": "Clutch" },
+      { role: "rowheader", scope: "row" },
       group !== null && h("span.group", group),
       h("a", { href: address }, clutch.clutch_id),
       clutch.origin === "simulated" && h("span.tag", "simulated"),
       h("small", `${clutch.friction_material} on ${clutch.reaction_plate}`),
     ),
-    cell("Health", ...health(summary, state.name)),
-    cell("Remaining", ...remaining(summary, state.name, scale)),
-    cell("Mean COF", ...meanCof(clutch)),
-    cell("Last run", ...lastRun(clutch), held > 0 && h("a", { href: address, class: "mark-held" }, heldText(held))),
-    cell("Diagnosis", ...diagnosis(clutch, address)),
+    cell(
+      "do",
+      { title: why ? `${clutch.action} ${words(why)}.` : clutch.action },
+      h(
+        "span.line",
+        raisedLink(alarms, address),
+        held > 0 && state.name !== "check" && h("a", { href: address, class: "mark-held" }, heldText(held)),
+        why === null && alarms.length === 0
+          ? h("span.quiet", clutch.action)
+          : h("a", { href: state.name === "out_of_specification" ? `${address}#/diagnosis` : address }, clutch.action),
+      ),
+      why && h("small", why),
+    ),
+    safeFor(summary, scale),
+    cell("share", {}, ...health(clutch)),
+    trend(clutch),
+    lastRun(clutch),
   );
 }
 
@@ -56,82 +73,54 @@ export function row(clutch, { scale, group, chosen, choose }) {
 export const kindOf = ({ friction_material: material, reaction_plate: plate, fluid }) =>
   `${words(material)} on ${plate}, ${fluid}`;
 
-/** @type {(name: string, ...content: Content[]) => HTMLElement} */
-const cell = (name, ...content) => h("td", { role: "cell", "data-label": name }, ...content);
+/** @type {(name: string, attributes: Record<string, string | null>, ...content: Content[]) => HTMLTableCellElement} */
+const cell = (name, attributes, ...content) => h("td", { role: "cell", class: name, ...attributes }, ...content);
 
-/** @type {(summary: ClutchSummary | null, state: StateName) => string[] | (HTMLElement | SVGSVGElement)[]} */
-function health(summary, state) {
+/** @param {ClutchOut} clutch */
+function health({ summary, state }) {
   const value = summary?.current.health ?? null;
   return value === null
     ? ["–"]
-    : [h("span.number", percent(value)), shareBar(value, { class: "health", style: colourOf(state) })];
+    : [h("span.number", percent(value)), shareBar(value, { class: "health", style: colourOf(state.name) })];
 }
 
 /**
- * A failure's state says already where the life ended.
+ * The safe bound, and the interval that it begins.
  * @param {ClutchSummary | null} summary
- * @param {StateName} state
  * @param {number} scale
  */
-function remaining(summary, state, scale) {
-  if (summary === null) return ["–", h("small", "after three tests")];
-  const { ended } = summary;
-  if (ended)
-    return [
-      ended.reason === "worn" ? h("span.number", "0") : "–",
-      state !== "failure" && h("small", `ended at ${fixed(ended.cycles)} cycles`),
-    ];
-  if (summary.status === "insufficient_data") return ["–", h("small", atLeast(summary.at_least))];
-  if (summary.status === "reached") return [h("span.number", "0"), h("small", "reached")];
-  const { remaining_cycles: q, at_least: bound, held_runs: held } = summary;
-  const lowered = held !== null && (bound ?? Infinity) < (q["0.05"] ?? Infinity);
-  return [
-    h("span.number", atLeast(bound)),
-    lowered && h("small", `if the held ${held.count === 1 ? "run counts" : "runs count"}`),
-    intervalBar(q, scale),
-    h("small", likely(q)),
-  ];
+function safeFor(summary, scale) {
+  if (summary === null) return cell("safe", {}, "–");
+  const { ended, status, remaining_cycles: q, at_least: bound } = summary;
+  if (ended) return cell("safe", {}, "–");
+  const few = bound !== null && bound >= 1 && bound < 10;
+  const number = h("span.number", few ? "< 10" : roundedDown(Math.max(0, bound ?? 0)));
+  if (status === "reached") return cell("safe", {}, number, h("small", "reached"));
+  if (status === "insufficient_data") return cell("safe", {}, number, h("small", "not known yet"));
+  const text = likely(q);
+  return cell("safe", { title: text }, number, intervalBar(q, scale), h("span.hidden", text));
 }
 
 /** @param {ClutchOut} clutch */
-function meanCof({ summary, recent, end_of_life: end }) {
+function trend({ summary, recent, end_of_life: end }) {
   const cof = summary?.current.mean_cof ?? null;
   const share = summary?.current.fraction_of_initial ?? null;
-  if (cof === null) return ["–"];
-  const threshold = share ? (end.cof_fraction * cof) / share : null;
-  return [
-    sparkline(recent?.mean_cof ?? [], threshold),
-    h(
-      "span.beside",
-      h("span.number", fixed(cof, 4)),
-      h(
-        "small",
-        share === null ? `at ${fixed(summary?.current.measured_at_cycles)} cycles` : `${percent(share)} of new`,
-      ),
-    ),
-  ];
+  if (cof === null) return cell("trend", {}, "–");
+  const title = `mean COF ${fixed(cof, 4)}${share === null ? "" : `, ${percent(share)} of new`}`;
+  const line = sparkline(recent?.mean_cof ?? [], share ? (end.cof_fraction * cof) / share : null);
+  return cell("trend", { title }, line, share !== null && h("small", percent(share)));
 }
 
 /** @param {ClutchOut} clutch */
 function lastRun({ recent }) {
-  if (recent === null) return ["none"];
+  if (recent === null) return cell("last", {}, "none");
   const { at, kind, cycles: count } = recent.last_run;
   const when = Date.parse(at);
-  const title = new Date(when).toLocaleString("en-GB");
-  return [
-    h("time", { datetime: at, title, "data-age": String(when) }, age(when)),
-    h("small", `${kindName(kind)} at ${cycles(count, 0, 20)} cycles`),
-  ];
-}
-
-/** @type {(clutch: ClutchOut, address: string) => HTMLElement[]} */
-function diagnosis({ diagnosis: latest }, address) {
-  if (latest === null) return [h("span.quiet", "not run")];
-  const verdict = latest.verdict ?? "";
-  const causes = latest.causes.map(words).join(", ");
-  const remarks = [causes, latest.adopted && "adopted", latest.earlier_life && "before the rebuild"];
-  return [
-    h("a", { href: `${address}#/diagnosis` }, VERDICTS[verdict] ?? words(verdict)),
-    h("small", remarks.filter(Boolean).join(" · ")),
-  ];
+  const title = `${kindName(kind)}, ${new Date(when).toLocaleString("en-GB")}`;
+  return cell(
+    "last",
+    { title },
+    h("time", { datetime: at, "data-age": String(when) }, age(when)),
+    h("small", `at ${cycles(count, 0, 20)} cycles`),
+  );
 }

@@ -14,7 +14,7 @@ import { COLUMNS, kindOf, row } from "./row.js";
 /** Rows of a block, at least a screen of them: drawn are the block in sight and one on either side. */
 const BLOCK = 40;
 /** The height of a row before one is measured, px. */
-const USUAL_HEIGHT = 64;
+const USUAL_HEIGHT = 44;
 
 export class Rows {
   /**
@@ -36,7 +36,7 @@ export class Rows {
     this.element = h(
       "table.fleet",
       { role: "table" },
-      h("caption.hidden", "Clutches, the lowest safe bound first"),
+      h("caption.hidden", "Clutches, what needs somebody first"),
       h("thead", { role: "rowgroup" }, h("tr", { role: "row", "aria-rowindex": 1 }, columns)),
       this.above,
       this.body,

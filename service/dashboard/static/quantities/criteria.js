@@ -96,8 +96,16 @@ export function byMeanCof(life) {
     const { fraction, limit, end_of_life_cycles: end, remaining_cycles: remaining } = own;
     const place = { ...criterion, fraction, threshold_mean_cof: limit };
     const ahead = remaining["0.5"] === 0 ? "reached" : "predicted";
-    const status = own.probability_of_reaching === null ? "insufficient_data" : ahead;
-    return { ...life, status, criterion: place, end_of_life_cycles: end, remaining_cycles: remaining };
+    const chance = own.probability_of_reaching;
+    const status = chance === null ? "insufficient_data" : ahead;
+    return {
+      ...life,
+      status,
+      probability_of_reaching: chance,
+      criterion: place,
+      end_of_life_cycles: end,
+      remaining_cycles: remaining,
+    };
   }
   const never = Object.fromEntries(Object.keys(life.end_of_life_cycles).map((level) => [level, null]));
   const place = { ...criterion, fraction: null, threshold_mean_cof: null };

@@ -1,7 +1,7 @@
 // An answer that takes the service seconds: read when its section is looked at, and again only when another one is wanted.
 
 import { Problem } from "../shared/api.js";
-import { watch } from "../shared/dom.js";
+import { computing, watch } from "../shared/dom.js";
 
 /** @import { Chart } from "../charts/chart.js" */
 
@@ -17,19 +17,17 @@ const AGAIN = 10;
 export function lazy(place, charts, read) {
   let [near, running] = [false, false];
   let [wanted, done] = ["", ""];
-  /** @param {string} text in place of the charts' notes */
-  const say = (text) => charts.forEach(({ note }) => note.replaceChildren(text));
   async function check() {
     if (!near || running || wanted === done) return;
     const now = wanted;
     running = true;
-    say("Being computed …");
+    for (const { note, title } of charts) computing(note, title.toLowerCase());
     try {
       await read();
       done = now;
     } catch (problem) {
       if (!(problem instanceof Problem)) throw problem;
-      say(`Not known: ${problem.message}. The page asks again.`);
+      for (const { note } of charts) note.replaceChildren(`Not known: ${problem.message}. The page asks again.`);
       setTimeout(check, (problem.retryAfter ?? AGAIN) * 1000);
       return;
     } finally {

@@ -4,7 +4,7 @@ import { chooser, setControls } from "../charts/chart.js";
 import { distinct } from "../charts/columns.js";
 import { PARAMETER_NAMES } from "../charts/parameters.js";
 import { Problem, read } from "../shared/api.js";
-import { h, quiet, scrolling, table } from "../shared/dom.js";
+import { computing, h, quiet, scrolling, table } from "../shared/dom.js";
 import { cycles, interval } from "../shared/format.js";
 import { problemView } from "../shared/problem_view.js";
 import { criterionRow, OWN_COLUMNS } from "./criteria.js";
@@ -92,7 +92,10 @@ export function remainingBy(place, reader) {
     const wanted = `${revision} ${query}`;
     if (!details.open || wanted === request) return;
     request = wanted;
-    answer.replaceChildren(quiet("Being computed …"));
+    computing(
+      answer,
+      `the remaining life by ${QUANTITIES[/** @type {keyof typeof QUANTITIES} */ (chosen.name)].title.toLowerCase()}`,
+    );
     try {
       /** @type {{ body: RemainingLife }} */
       const { body } = await read(`${reader.path}/remaining-useful-life?${query}`);

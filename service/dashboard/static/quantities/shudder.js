@@ -10,15 +10,20 @@ const COLUMNS = [KIND, PRESSURE, column("speed, rpm"), CYCLES, ...intervalColumn
 
 const NO_SLOPES = "The slope needs a stationary test whose curves determine all four parameters.";
 
+/** Beside a limit that no criterion of the clutch has: its state and what limits it first do not follow from it. */
+const NO_CRITERION = "No criterion of this clutch: it does not end its life and does not count for its state.";
+
 /**
  * The slopes at one pressure, a colour a speed.
- * @param {{ items: DegradationItem[], limits: CriterionOutcome[] | null, events: Receipt[] }} answers `limits`: when slopes
- *   there reach their limit; null while it is computed
+ * @param {{ items: DegradationItem[], limits: CriterionOutcome[] | null, counts: boolean, events: Receipt[] }} answers
+ *   `limits`: when slopes there reach their limit; null while it is computed; `counts`: whether that ends the clutch's life
  * @returns {Spec}
  */
-export function shudderMargin({ items, limits, events }) {
+export function shudderMargin({ items, limits, counts, events }) {
   if (items.length === 0) return { empty: NO_SLOPES };
-  const when = limits === null ? "Computing when the margin is used up …" : limits.map(limitText).join(" ");
+  const found = (limits ?? []).map(limitText);
+  const when =
+    limits === null ? "Computing when the slope reaches 0 …" : [...found, counts ? "" : NO_CRITERION].join(" ");
   return {
     note: `At ${pressureText(items[0].pressure_bar)}. Below the dashed line friction falls with speed, and the driveline may shudder. ${when}`,
     columns: COLUMNS,

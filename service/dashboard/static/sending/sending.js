@@ -1,6 +1,7 @@
 // Sending runs: files that are dropped or chosen go in; for each its receipt, or every place where it is wrong, comes out.
-// Open this file first: the dialog. Then batch.js (which files are runs), run_file.js (one of them), file_name.js (what its
-// name says), importer.js (how it is read), registration.js (a clutch that is not known yet) and receipt.js (what the service made of a run).
+// Open this file first: the dialog, which taking.js loads. Then batch.js (which files are runs), run_file.js (one of them),
+// file_name.js (what its name says), importer.js (how it is read), registration.js (a clutch that is not known yet) and
+// receipt.js (what the service made of a run).
 
 import { clutchPath, Problem, read } from "../shared/api.js";
 import { answered, button, field, form, h } from "../shared/dom.js";
@@ -10,13 +11,10 @@ import { IDENTIFIER, register } from "./registration.js";
 import { registeredLike, similarRegistered } from "./similar_names.js";
 
 /** @import { Batch } from "./batch.js" */
+/** @import { Page } from "./taking.js" */
 
-/** @typedef {{ clutch?: string, sent: () => unknown }} Page without a clutch the reader names it; `sent`: hears of stored runs */
-
-/** @type {(button: HTMLElement, page: Page) => void} make a button and the whole page take files */
-export function sender(button, page) {
-  takeFiles(button, async (files) => open(await batchOf(files), page));
-}
+/** @type {(files: File[], page: Page) => Promise<void>} */
+export const sendFiles = async (files, page) => open(await batchOf(files), page);
 
 /** @type {(batch: Batch, page: Page) => void} the dialog that sends them */
 function open(batch, page) {
@@ -148,45 +146,4 @@ function summary(stored, failed, held, id) {
   const doubted = held > 0 && ` ${held} of them ${held === 1 ? "is" : "are"} held, and must be confirmed or corrected.`;
   const link = h("a", { href: `/clutches/${encodeURIComponent(id)}` }, `Open ${id}`);
   return h("p", { class: `notice ${failed > 0 ? "bad" : "good"}` }, text, doubted, " ", stored > 0 && link);
-}
-
-/** @type {(button: HTMLElement, take: (files: File[]) => unknown) => void} from a button and dropped on the page */
-function takeFiles(button, take) {
-  const chooser = h("input", { type: "file", multiple: true, hidden: true, "aria-label": "Run files" });
-  chooser.addEventListener("change", () => {
-    if (chooser.files?.length) take([...chooser.files]);
-  });
-  document.body.append(chooser);
-  button.addEventListener("click", () => {
-    chooser.value = "";
-    chooser.click();
-  });
-  takeDropped(take);
-}
-
-/** @param {(files: File[]) => unknown} take */
-function takeDropped(take) {
-  let depth = 0;
-  /** @param {number} level elements entered and not yet left */
-  const setDepth = (level) => {
-    depth = level;
-    document.body.classList.toggle("dropping", depth > 0);
-  };
-  /** @param {DragEvent} event */
-  const hasFiles = (event) => event.dataTransfer?.types.includes("Files") ?? false;
-  addEventListener("dragenter", (event) => {
-    if (hasFiles(event)) setDepth(depth + 1);
-  });
-  addEventListener("dragleave", () => setDepth(Math.max(0, depth - 1)));
-  addEventListener("dragover", (event) => {
-    if (hasFiles(event)) event.preventDefault();
-  });
-  addEventListener("drop", (event) => {
-    if (!hasFiles(event)) return;
-    event.preventDefault();
-    setDepth(0);
-    if (document.querySelector("dialog[open]")) return; // one question at a time
-    const files = [...(event.dataTransfer?.files ?? [])];
-    if (files.length > 0) take(files);
-  });
 }

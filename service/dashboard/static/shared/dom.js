@@ -116,6 +116,17 @@ export function form(submit, ...content) {
   return h("form", { autocomplete: "off", onsubmit }, ...content);
 }
 
+/** @type {(place: Element, what: string) => void} say in a place what is computed, and for how long, until something else stands there */
+export function computing(place, what) {
+  const start = Date.now();
+  const line = h("span", `Computing ${what} …`);
+  place.replaceChildren(line);
+  const timer = setInterval(() => {
+    if (line.parentElement !== place) return clearInterval(timer);
+    line.textContent = `Computing ${what} for ${Math.round((Date.now() - start) / 1000)} s …`;
+  }, 1000);
+}
+
 /** @type {(letter: string, index: string) => HTMLElement} a letter with its index */
 export const symbol = (letter, index) => h("span", letter, h("sub", index));
 

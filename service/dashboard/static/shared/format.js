@@ -80,10 +80,13 @@ export function likely(quantiles) {
   return `50 % chance of ${about} or more; 90 % interval: ${interval(quantiles)}`;
 }
 
+/** Fewer cycles than this are not counted out. */
+const FEW = 10;
+
 /** @type {(bound: number | null) => string} the safe bound of remaining cycles, rounded down to two digits */
 export function atLeast(bound) {
   if (bound === null || bound < 1) return "no further cycle is safe";
-  return `safe for ${roundedDown(bound)} (95\u00a0%)`;
+  return `safe for ${bound < FEW ? `fewer than ${FEW}` : roundedDown(bound)} (95\u00a0%)`;
 }
 
 /** @type {(value: number) => string} cycles, rounded down to two digits */
