@@ -20,6 +20,23 @@ CONFIRMED = 1e-2
 #: Odds of a slip from which a run is held.
 HELD = 0.1
 
+# What may happen to a counter from some run on (`common_causes`): prior odds, a run. Chosen: a controller is replaced, or a
+# logger unplugged, about once in some hundred tests; `make plausibility` shows what is found.
+
+#: It restarts at zero; it rolls over, at each of the numbers below; another one takes over, or it counts in another unit; it
+#: stands still; runs of another clutch come under this one's name.
+COUNTER_RESTARTS, COUNTER_ROLLS_OVER, COUNTER_CHANGED, COUNTER_STANDS, TWO_CLUTCHES = 2e-3, 1e-3, 1e-3, 1e-3, 3e-4
+#: What counters roll over at: 16 bits, and displays of three to seven digits.
+ROLLS_OVER_AT = (65_536.0, 1e3, 1e4, 1e5, 1e6, 1e7)
+#: How many cycles one of another unit is: thousands, and back; miles for kilometres, and back.
+UNITS_OF_CYCLES = (1e3, 1e-3, 1.609_344, 0.621_371)
+#: Steps between dates closer than this [s] say nothing of pace; nor do those before so many others; the deviation of a log
+#: pace is this at least, and its degrees of freedom; one so many deviations faster than usual is asked about. Chosen: tests
+#: last some minutes; with one degree of freedom, counters that jump were taken for rigs that run faster.
+LEAST_SECONDS, FEWEST_RATES, LEAST_RATE_SD, RATE_FREEDOM, FAST = 60.0, 2, 0.35, 8.0, 3.0
+#: Runs by date before and after a change that are looked at, and how many changes are asked about at once at most.
+LOOKED_BACK, MOST_ASKED = 20, 4
+
 # Mean COF that is possible at all
 
 #: Median of a wet clutch's mean COF [-], and the deviation of its logarithm: two deviations cover 0.03 to 0.33. Chosen:

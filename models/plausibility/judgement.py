@@ -87,6 +87,18 @@ def judge(runs: Sequence[Run], about: Collection[int] = ()) -> JointJudgement:
     return JointJudgement(held=held_runs, tests=clutch.followed, levels=levels - held_runs.keys())
 
 
+def log_probability_of(runs: Sequence[Run]) -> float:
+    """Log probability of all that runs show, in the order of their history, summed over the beliefs that are met."""
+    met = _searched(_Clutch(runs=tuple(runs), about=frozenset()))[1]
+    return float(np.logaddexp.reduce(list(met.values())))
+
+
+def log_cycles_of(runs: Sequence[Run]) -> float:
+    """Log probability of the cycles and dates of runs alone, in the order of their history."""
+    clutch = _Clutch(runs=tuple(runs), about=frozenset())
+    return float(clutch.log_cycles(clutch.cycles[None, clutch.near])[0])
+
+
 def _held(clutch: "_Clutch", best: "_Weighed", weighed: dict[Belief, float]) -> dict[int, SlipVerdict]:
     """Verdicts on the runs that probably slipped, by the beliefs that were met."""
     weighed |= {other: _Weighed(clutch=clutch, belief=other).log_probability for other in best.instead()}

@@ -66,6 +66,10 @@ class Run(_RunFields):
     `rebuild` one that begins a life; `fixed` a run that somebody confirmed: it is not held, and seldom slipped all the same.
     """
 
+    def at(self, cycles: float) -> "Run":
+        """The run as if it had been sent at other cycles."""
+        return self._replace(cycles=cycles, reading=lambda: replace(self.sent, cycles=cycles))
+
     @cached_property
     def sent(self) -> RunReading:
         """The run as it came in."""

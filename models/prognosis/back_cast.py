@@ -1,16 +1,18 @@
 """What earlier forecasts of a clutch said about the tests since, and how much wider its intervals are to be for it.
 
 A forecast is kept after the third, fourth, sixth, eighth … test: the median and the 90 % interval of ξ ahead. A later test
-is judged by the newest forecast that was made at 80 % of its progress or before. Its miss is how far it lies from the
-median, in half widths of the interval on that side, with the scatter from run to run and the variance of its fit; three at
-most, since a run may be outlying.
+is judged by the newest forecast that was made at 80 % of its progress or before. Its miss is how far it lies above the
+median, negative below it, in half widths of the interval on that side, with the scatter from run to run and the variance of
+its fit; three at most, since a run may be outlying.
 
 Where forecasts fared badly a prognosis is wider: remaining life is raised, as a multiple of its median, to the power
 
-    w = max(1, the ⌈0.9 (m + 1)⌉-th smallest of m misses),
+    w = max(1, the ⌈0.95 (m + 1)⌉-th smallest of m misses),
 
-the largest where m is below 9: the quantile of split conformal prediction. The misses of one life are no independent
-draws, so it promises nothing here; docs/appendix/prognosis.md says what it achieves.
+the largest where m is below 19: the quantile of split conformal prediction, of one side. Tests below their forecast say that
+the end may come earlier, and widen what lies before the median; tests above it what lies after: a clutch that is better than
+predicted is no less safe. The misses of one life are no independent draws, so it promises nothing here;
+docs/appendix/prognosis.md says what it achieves.
 
 Source: H. Papadopoulos, K. Proedrou, V. Vovk, A. Gammerman, ECML (2002) 345-356, for the quantile.
 """
@@ -33,7 +35,7 @@ from models.tracking.prior import TrackPrior
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BackCast:
     """`forecasts` [f, 2 + 3 a]: progress and epoch of each, then at each of AHEAD its lower end, median and upper end;
-    `misses` [m] of the tests that were judged."""
+    `misses` [m] of the tests that were judged, negative where they lay below the median."""
 
     forecasts: FloatArray
     misses: FloatArray
@@ -46,7 +48,7 @@ class BackCast:
     @property
     def held(self) -> int:
         """How many tests lay within the intervals that were forecast for them."""
-        return int(np.count_nonzero(self.misses <= 1.0))
+        return int(np.count_nonzero(np.abs(self.misses) <= 1.0))
 
     @property
     def surprising(self) -> bool:
@@ -54,13 +56,10 @@ class BackCast:
         return bool(bdtr(self.held, self.misses.size, COVERAGE) < 0.05)
 
     @property
-    def widening(self) -> float:
-        """The power w >= 1."""
-        count = self.misses.size
-        if count == 0:
-            return 1.0
-        rank = min(math.ceil(COVERAGE * (count + 1)), count)
-        return max(1.0, float(np.sort(self.misses)[rank - 1]))
+    def widening(self) -> tuple[float, float]:
+        """The powers w >= 1 of what lies before the median of remaining life, by tests below their forecasts, and of what
+        lies after it, by tests above them."""
+        return _power(-self.misses), _power(self.misses)
 
     def judged(self, test: Measurement) -> "BackCast":
         """With the miss of one more test, if there is a forecast that reaches it, and no event lies between."""
@@ -78,8 +77,8 @@ class BackCast:
             float(np.interp(test.progress, row[0] * np.array(AHEAD), ends)) for ends in row[2:].reshape(-1, 3).T
         )
         half = math.hypot(median - low if test.value < median else high - median, Z90 * math.sqrt(test.variance))
-        miss = abs(test.value - median) / half if half > 0.0 else 0.0
-        return replace(self, misses=np.append(self.misses, min(miss, 3.0)))  # it may be outlying
+        miss = (test.value - median) / half if half > 0.0 else 0.0
+        return replace(self, misses=np.append(self.misses, max(-3.0, min(miss, 3.0))))  # it may be outlying
 
     def forecast(self, posterior: TrackPosterior, newest: Measurement, prior: TrackPrior) -> "BackCast":
         """With the forecast of a posterior that knows all tests up to the newest."""
@@ -90,6 +89,14 @@ class BackCast:
         ends = medians[:, None] + np.array([-1.0, 0.0, 1.0]) * half
         row = np.concatenate([[newest.progress, newest.epoch], ends.ravel()])
         return replace(self, forecasts=np.vstack([self.forecasts, row]))
+
+
+def _power(misses: FloatArray) -> float:
+    """w by misses [m] that are positive on its side."""
+    if misses.size == 0:
+        return 1.0
+    rank = min(math.ceil(0.5 * (1.0 + COVERAGE) * (misses.size + 1)), misses.size)
+    return max(1.0, float(np.sort(misses)[rank - 1]))
 
 
 def kept_after(tests: int) -> bool:

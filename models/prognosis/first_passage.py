@@ -129,13 +129,17 @@ def ends_of_life(
     return np.minimum(passages, posterior.course_end)
 
 
-def widened(passages: FloatArray, weight: FloatArray, *, as_of: float, horizon: float, power: float) -> FloatArray:
-    """Passages [n] whose remaining life is raised to a power >= 1 as a multiple of its median, or of the horizon where the
-    median lies beyond it. A life that has ended, more likely than not, stays as it is."""
+def widened(
+    passages: FloatArray, weight: FloatArray, *, as_of: float, horizon: float, powers: tuple[float, float]
+) -> FloatArray:
+    """Passages [n] whose remaining life is raised as a multiple of its median, or of the horizon where the median lies
+    beyond it: by the first of two powers >= 1 before the median, by the second after it. A life that has ended, more likely
+    than not, stays as it is."""
     remaining = passages - as_of
     middle = float(weighted_quantiles(np.minimum(remaining, horizon - as_of), weight, (0.5,))[0])
-    if power == 1.0 or middle <= 0.0:
+    if powers == (1.0, 1.0) or middle <= 0.0:
         return passages
+    power = np.where(remaining < middle, *powers)
     with np.errstate(over="ignore"):
         raised = middle * (np.maximum(remaining, 0.0) / middle) ** power
     return np.where(remaining > 0.0, as_of + raised, passages)

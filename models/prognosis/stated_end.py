@@ -123,11 +123,11 @@ def stated_end(
     as_of: float,
     horizon: float,
     offset: Offset | None = None,
-    power: float = 1.0,
+    powers: tuple[float, float] = (1.0, 1.0),
     ended: Sequence[ObservedLife] = (),
     tests: Sequence[Measurement] = (),
 ) -> StatedEnd:
-    """The end of a life that is at ζ = `as_of`, as `posterior` has it, its remaining part `widened` by `power`.
+    """The end of a life that is at ζ = `as_of`, as `posterior` has it, its remaining part `widened` by `powers`.
 
     By its `tests` it may have been new at the first of them; and what lies ahead of it is that of a clutch like the `ended`
     ones, with the probability that it is of their kind. What is behind, and a life that is over more likely than not, stays.
@@ -146,7 +146,7 @@ def stated_end(
         )
         ends, form = np.concatenate([ends, elsewhere.ends]), np.concatenate([form, elsewhere.form])
         weight = np.concatenate([weight, probability * elsewhere.weight])
-    ends = widened(ends, weight, as_of=as_of, horizon=horizon, power=power)
+    ends = widened(ends, weight, as_of=as_of, horizon=horizon, powers=powers)
     passed = float(weight[ends <= as_of].sum())
     kin, lives = None, 0
     if ended and as_of > 0.0 and passed < 0.5:

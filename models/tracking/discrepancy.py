@@ -7,9 +7,14 @@ continues with the slope it has and further curvature on stretches that grow wit
 (ζ/T)^1.5: a discrepancy observed today widens every forecast, the further ahead the more. At ten times T it levels off:
 what is observed over a tenth of a course must not make every course pass every threshold in the end.
 
-A course that has a discrepancy may also have a knee ahead: from ζ_k > T on it goes faster by g times its mean pace until
-then, g (ξ(ζ_k) - ξ0)/ζ_k (ζ - ζ_k), linear in ξ0 and Δ as the course is. Before any sign of it, it may come at any time:
-P(none until ζ) = (T/ζ)^h. A knee that is behind is part of δ, whose slope goes on.
+A course that has a discrepancy, or shows no wear yet, may also have a knee ahead: from ζ_k > T on it does not rise, and
+falls faster by g times its mean pace of wear until then,
+
+    ξ(ζ) = min(ξ(ζ), ξ(ζ_k)) - g w/ζ_k (ζ - ζ_k),   w = max(ξ0 - ξ(ζ_k), 0) + u ξ0,
+
+where a small share u of the value when new counts as worn whatever is seen: what runs in or stays level will wear. A knee
+comes with the probability p, and if so at any time: P(none until ζ) = 1 - p (1 - T/ζ), whose scale is that of what was
+tested; before a second test there is none. A knee that is behind is part of δ, whose slope goes on.
 
 An event such as an oil change begins an epoch, whose level is off by a normal step from the one before.
 
@@ -24,8 +29,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
-from models.tracking.criteria import KNEE_PACE, LEVELLING, LOG_KNEE_PACE_SD
-from models.tracking.history import History, later_epochs, span_of
+from models.tracking.criteria import KNEE_PACE, LEVELLING, LOG_KNEE_PACE_SD, UNSEEN_WEAR
+from models.tracking.history import LEAST_SPAN, History, later_epochs, span_of
 from models.tracking.prior import TrackPrior
 
 #: Stretches of constant curvature: equal ones up to T, then growing ones, up to LEVELLING times T; there δ levels off.
@@ -89,8 +94,8 @@ class CourseDiscrepancy:
     """Courses beside eq. 6, one for each of n draws, in the unit of the quantity.
 
     `span` is T; `size` [n] is q; `curvature` [n, PAST + FUTURE] multiplies `smooth`; the level steps by `height`
-    [n, e] at progress `at` [e]. From the progress `knee` [n] on, inf where there is none, a course goes faster by
-    `steepening` [n] times its mean pace until then.
+    [n, e] at progress `at` [e]. From the progress `knee` [n] on, inf where there is none, a course falls faster by
+    `steepening` [n] times its mean pace of wear until then.
     """
 
     span: float
@@ -126,7 +131,7 @@ class CourseDiscrepancy:
     @property
     def present(self) -> NDArray[np.bool_]:
         """Which draws are not eq. 6 alone [n]."""
-        return np.asarray((self.size > 0.0) | self.height.any(axis=1))
+        return np.asarray((self.size > 0.0) | np.isfinite(self.knee) | self.height.any(axis=1))
 
     def taken(self, index: NDArray[np.intp]) -> "CourseDiscrepancy":
         """The courses at `index`."""
@@ -151,15 +156,22 @@ def _stretchwise(curvature: FloatArray, time: FloatArray) -> FloatArray:
 
 
 def drawn(
-    history: History, prior: TrackPrior, size: FloatArray, terms: FloatArray, rng: np.random.Generator
+    history: History,
+    prior: TrackPrior,
+    size: FloatArray,
+    terms: FloatArray,
+    worn: FloatArray,
+    rng: np.random.Generator,
 ) -> CourseDiscrepancy:
-    """Courses from drawn terms [n, PAST + e] in the unit of the quantity; the future is drawn here."""
+    """Courses from drawn terms [n, PAST + e] in the unit of the quantity, each `worn` by a share of ξ0 [n] so far; the
+    future is drawn here."""
     ahead = np.zeros((size.size, FUTURE))
     alive = size > 0.0
     ahead[alive] = rng.standard_normal((int(alive.sum()), FUTURE)) * (size[alive] * prior.size)[:, None]
     knee, steepening = np.full(size.size, np.inf), np.ones(size.size)
-    if prior.knee_hazard > 0.0:
-        knee[alive] = history.span * rng.random(int(alive.sum())) ** (-1.0 / prior.knee_hazard)
+    if prior.knee_probability > 0.0 and history.progress.max(initial=0.0) > LEAST_SPAN:
+        ahead_of_knee = (alive | (worn < UNSEEN_WEAR)) & (rng.random(size.size) < prior.knee_probability)
+        knee[ahead_of_knee] = history.span / (1.0 - rng.random(int(ahead_of_knee.sum())))
         steepening = KNEE_PACE * np.exp(LOG_KNEE_PACE_SD * rng.standard_normal(size.size))
     return CourseDiscrepancy(
         span=history.span,

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from models.arrays import FloatArray
 from models.degradation.general_order import DegradationLaw
 from models.tracking.courses import UNIT_OF_CHANGE, basis, coordinates_of, course_of, form_of
+from models.tracking.criteria import UNSEEN_WEAR
 from models.tracking.discrepancy import BY_DRAW, CourseDiscrepancy
 from models.tracking.measurement import Measurement
 from models.tracking.prior import TrackPrior
@@ -90,8 +91,10 @@ class TrackPosterior:
         if discrepancy is None or not (discrepancy.knee < furthest).any():
             return values
         knee = np.minimum(discrepancy.knee, furthest)
-        pace = (self._without_knee(knee[None])[0] - self.initial) / knee
-        return np.asarray(values + discrepancy.steepening * pace * np.maximum(zeta - knee, 0.0))
+        at_knee = self._without_knee(knee[None])[0]
+        worn = np.maximum(self.initial - at_knee, 0.0) + UNSEEN_WEAR * self.initial
+        level = np.where(zeta > knee, np.minimum(values, at_knee), values)
+        return np.asarray(level - discrepancy.steepening * (worn / knee) * np.maximum(zeta - knee, 0.0))
 
     def _without_knee(self, progress: FloatArray) -> FloatArray:
         zeta = progress if progress.ndim == 2 else progress[:, None]

@@ -92,6 +92,7 @@ def with_linear_terms(
     further = rng.standard_normal((weight.size, PAST + history.steps.size))
     further = drawn_terms(terms, initial - prior.initial_mean, change, further)
     scale, exponent = coefficients_at(points.log_scale, points.log_exponent, points.course)
+    worn = -change * points.basis(np.array([history.span]))[0] / initial
     return TrackPosterior(
         weight=weight,
         initial=initial,
@@ -100,5 +101,5 @@ def with_linear_terms(
         exponent=exponent,
         scatter=np.exp(points.log_scatter),
         proportional=FORM_PROPORTIONAL[points.form],
-        discrepancy=drawn(history, prior, points.size, further, rng),
+        discrepancy=drawn(history, prior, points.size, further, worn, rng),
     )

@@ -34,7 +34,7 @@ _SHARED: tuple[tuple[Any, str], ...] = (
     ([[0.1, -0.2], [0.0, 0.1]], "pressure_cycles speed_pressure"), (5.0, "reduction_percent_sd pressure_bar"),
     (0.5, "cof_fraction fraction share_of_life"),
     (2, "friction_faces maintenance LifeNumber.number LifeNumber.of FleetTotals.archived"),
-    (1.0, "pressure_factor exponent widening"), (20.0, "torque_filter_ms motor_torque_limit_nm"),
+    (1.0, "pressure_factor exponent widening widening_later"), (20.0, "torque_filter_ms motor_torque_limit_nm"),
     (0.6, "coulomb_ratio asymptote fraction_of_initial"),
     (7000, "until cycles likely_cycles as_of_cycles at_cycles measured_at_cycles"),
     (0.9, "duration_s engagement_duration_s coverage above"), (18.0, "energy_kj energy_per_cycle_kj"),

@@ -224,8 +224,12 @@ class BackCastCount(Answer):
     held: int = Field(description="Number of tests within the 90 % interval of their forecast")
     of: int = Field(description="Number of tests with an earlier forecast")
     widening: Real = Field(
-        description="How much the interval was widened because earlier forecasts missed (exponent of remaining "
-        "life over its median); 1: not at all"
+        description="How much the interval below the median was widened because tests lay below earlier forecasts "
+        "(exponent of remaining life over its median); 1: not at all"
+    )
+    widening_later: Real = Field(
+        description="The same of the interval above the median, because tests lay above earlier forecasts; it does not "
+        "change the safe bound"
     )
 
 

@@ -202,6 +202,24 @@ class Confirmations(base.Schema):
     reason: base.Reason = Field(default="", description="Why")
 
 
+class Withdrawals(base.Schema):
+    """Runs to withdraw or to restore together, and the reason."""
+
+    run_ids: list[base.Identifier] = Field(min_length=1, max_length=base.MAX_CONFIRMED, description="The runs")
+    reason: GivenReason = Field(description="Why")
+
+
+class Corrections(base.Schema):
+    """The true cycles of several runs, and the reason."""
+
+    cycles: dict[base.Identifier, base.Cycles] = Field(
+        min_length=1,
+        max_length=base.MAX_CONFIRMED,
+        description="Duty cycles since new when each run was made, by run_id",
+    )
+    reason: GivenReason = Field(description="Why")
+
+
 class Correction(base.Schema):
     """A correction: the true cycles of a run, or the rig profile to read its file again, and the reason."""
 

@@ -7,7 +7,7 @@ and again where the clutch has changed meanwhile.
 
 import tempfile
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from datetime import datetime
 from itertools import compress
 from pathlib import Path
@@ -36,13 +36,14 @@ from service.clutch.recomputation import (
 from service.clutch.timeline import (
     STATIONARY,
     Event,
+    Shown,
     life_with,
     order,
     require_within_ends,
     stationary_tests_of,
 )
 from service.clutch.with_held import held_summary, summarised
-from service.errors import NotPossibleNowError
+from service.errors import Notice, NotPossibleNowError
 from service.runs.upload import read_file_run
 from storage import changes, raw_columns, runs
 from storage.engine.database import Database
@@ -52,8 +53,7 @@ from storage.runs import RunRow
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Request:
-    """What is asked for, of which runs, by whom, when and why; `cycles` where a run is corrected. Several runs are only
-    confirmed."""
+    """What is asked for, of which runs, by whom, when and why; `cycles` by run_id where runs are corrected."""
 
     clutch_id: str
     run_ids: tuple[str, ...]
@@ -61,7 +61,7 @@ class _Request:
     reason: str
     by: str
     at: str
-    cycles: float | None = None
+    cycles: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,7 +74,7 @@ class _Loaded:
     state: ClutchHistory
     levels: Levels
     receipts: Mapping[str, Evaluation]
-    withdrawn_from: str
+    withdrawn_from: Mapping[str, str]
     again: Arrival | None = None
 
     @property
@@ -110,17 +110,19 @@ def change(
     reason: str,
     by: str,
     at: str,
-    cycles: float | None = None,
+    cycles: Mapping[str, float] | None = None,
 ) -> list[Receipt]:
     """Change runs in one step; returns their receipts in the order asked for.
 
     `action` of storage.changes: WITHDRAW takes a run out of its clutch's history, RESTORE takes that back (it is accepted or
-    held as before), CONFIRM accepts those that are held as they are, CORRECT puts a run to other `cycles`, where doubts are
-    asked again. Only CONFIRM takes several runs. Raises NotFoundError where one is none of the clutch's, and
+    held as before), CONFIRM accepts those that are held as they are, CORRECT puts runs to other `cycles`, by run_id, where
+    doubts are asked again, of all of them together. Raises NotFoundError where one is none of the clutch's, and
     NotPossibleNowError where one that is withdrawn is to be corrected; then nothing is changed.
     """
     names = tuple(dict.fromkeys(run_ids))
-    request = _Request(clutch_id=clutch_id, run_ids=names, action=action, reason=reason, by=by, at=at, cycles=cycles)
+    request = _Request(
+        clutch_id=clutch_id, run_ids=names, action=action, reason=reason, by=by, at=at, cycles=cycles or {}
+    )
     receipts = {answer.run_id: answer for answer in _change(database, request)}
     return [receipts[run_id] for run_id in names]
 
@@ -217,19 +219,18 @@ def _load(database: Database, request: _Request) -> _Loaded:
         state = repository.state(connection, clutch_id)
         by_name = {event.run_id: event for event in state.events} | repository.set_aside(connection, clutch_id)
         events = order([by_name[run_id] for run_id in rows])
-        trail = [
-            change
-            for run_id, row in rows.items()
-            if row.state == runs.WITHDRAWN
-            for change in changes.page(connection, clutch_id, run_id=run_id)
-        ]
+        withdrawn = [run_id for run_id, row in rows.items() if row.state == runs.WITHDRAWN]
+        trails = {run_id: changes.page(connection, clutch_id, run_id=run_id) for run_id in withdrawn}
         return _Loaded(
             rows=tuple(rows[event.run_id] for event in events),
             events=events,
             state=state,
             levels=repository.levels(connection, clutch_id),
             receipts=repository.receipts(connection, clutch_id),
-            withdrawn_from=next((change.before["state"] for change in trail if change.action == changes.WITHDRAW), ""),
+            withdrawn_from={
+                run_id: next(change.before["state"] for change in trail if change.action == changes.WITHDRAW)
+                for run_id, trail in trails.items()
+            },
         )
 
 
@@ -237,40 +238,56 @@ def _as_asked(database: Database, loaded: _Loaded, request: _Request) -> tuple[R
     """The runs as they are asked for; each as it is where that changes nothing."""
     if request.action == changes.CONFIRM:
         return tuple(replace(row, state=runs.ACCEPTED) if row.state == runs.HELD else row for row in loaded.rows)
-    row = loaded.row
     if request.action == changes.WITHDRAW:
-        return (replace(row, state=runs.WITHDRAWN),)
+        return tuple(replace(row, state=runs.WITHDRAWN) for row in loaded.rows)
     if request.action == changes.RESTORE:
-        return (replace(row, state=loaded.withdrawn_from) if row.state == runs.WITHDRAWN else row,)
-    if row.state == runs.WITHDRAWN:
-        raise NotPossibleNowError(f"run {row.run_id!r} is withdrawn: restore it before it is changed")
-    cycles = row.cycles if request.cycles is None else request.cycles
-    return (row if loaded.again is None and cycles == row.cycles else _judged(database, loaded, cycles),)
+        return tuple(
+            replace(row, state=loaded.withdrawn_from[row.run_id]) if row.state == runs.WITHDRAWN else row
+            for row in loaded.rows
+        )
+    for row in loaded.rows:
+        if row.state == runs.WITHDRAWN:
+            raise NotPossibleNowError(f"run {row.run_id!r} is withdrawn: restore it before it is changed")
+    cycles = [request.cycles.get(row.run_id, row.cycles) for row in loaded.rows]
+    if loaded.again is None and cycles == [row.cycles for row in loaded.rows]:
+        return loaded.rows
+    return _judged(database, loaded, cycles)
 
 
-def _judged(database: Database, loaded: _Loaded, cycles: float) -> RunRow:
-    """The run at other cycles: accepted where it is plausible there, else held."""
-    row, other_runs = loaded.row, loaded.others
-    sent_cycles = row.cycles if row.sent_cycles is None else row.sent_cycles
+def _judged(database: Database, loaded: _Loaded, cycles: Sequence[float]) -> tuple[RunRow, ...]:
+    """The runs at other cycles, all of them judged together: accepted where they are plausible there, else held."""
+    other_runs, alone = loaded.others, dict[str, tuple[Notice, ...]]()
+    events = []
+    for row, event, at in zip(loaded.rows, loaded.events, cycles, strict=True):
+        moved = event.at(at)
+        moved = replace(moved, cofs=cofs_among(other_runs, moved, loaded.levels.get(row.run_id, ())))
+        shown, alone[row.run_id] = _alone(database, loaded, row, at)
+        events.append(replace(moved, shown=shown, confirmed=False))
+    asked = [event for event in events if not alone[event.run_id]]
+    together: Mapping[str, tuple[Notice, ...]] = {}
+    if asked:
+        among = replace(other_runs, held=order([*other_runs.held, *asked[:-1]]))
+        together = _together(among, asked[-1]).doubts
+    rows = []
+    for row, at in zip(loaded.rows, cycles, strict=True):
+        doubtful = alone[row.run_id] or together.get(row.run_id, ())
+        sent_cycles = row.cycles if row.sent_cycles is None else row.sent_cycles
+        state, items = runs.HELD if doubtful else runs.ACCEPTED, tuple(doubted(doubtful))
+        kept = None if at == sent_cycles else sent_cycles
+        rows.append(replace(row, cycles=at, sent_cycles=kept, state=state, doubts=items))
+    return tuple(rows)
+
+
+def _alone(database: Database, loaded: _Loaded, row: RunRow, cycles: float) -> tuple[Shown | None, tuple[Notice, ...]]:
+    """What a run at other cycles shows, and what is odd about it by itself."""
     sent = replace(loaded.reader(database).read(row.run_id), cycles=cycles)
-    event = loaded.event.at(cycles)
-    event = replace(event, cofs=cofs_among(other_runs, event, loaded.levels.get(row.run_id, ())))
     if loaded.again is None:
-        analysis = analyse(sent, other_runs.geometry, other_runs.record.torque_filter)
+        analysis = analyse(sent, loaded.state.geometry, loaded.state.record.torque_filter)
     else:
         analysis = loaded.again.analysis
     if "time_s" in sent.channels and sent.kind == STATIONARY:  # as on arrival: its plateaus stand for a long record
         sent = replace(sent, channels={})
-    shown, doubtful = doubts_alone(sent, analysis, other_runs.geometry)
-    if not doubtful:
-        doubtful = _together(other_runs, replace(event, shown=shown, confirmed=False)).doubts.get(row.run_id, ())
-    return replace(
-        row,
-        cycles=cycles,
-        sent_cycles=None if cycles == sent_cycles else sent_cycles,
-        state=runs.HELD if doubtful else runs.ACCEPTED,
-        doubts=tuple(doubted(doubtful)),
-    )
+    return doubts_alone(sent, analysis, loaded.state.geometry)
 
 
 def _together(others: ClutchHistory, incoming: Event | None, changed: Sequence[Event] = ()) -> Judged:

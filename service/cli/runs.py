@@ -91,16 +91,38 @@ def confirm(
 def correct(
     service: Service,
     clutch: ClutchId,
-    run: RunId,
     reason: Reason,
+    run: Annotated[str | None, typer.Argument(metavar="[RUN]", help="The name of the run")] = None,
     cycles: Annotated[
         float | None, typer.Option(min=0, help="The right number of cycles, from new to this run")
     ] = None,
     rig: Annotated[str | None, typer.Option(help="Read the run's file again with this rig profile")] = None,
+    doubt: Annotated[
+        str,
+        typer.Option(
+            help="All runs held for this code, as counter_changed: each at the cycles that its doubt asks about"
+        ),
+    ] = "",
 ) -> None:
-    """Correct the cycles of a run, or read its file again with another rig profile."""
-    if (cycles is None) == (rig is None):
-        raise typer.BadParameter("use --cycles or --rig")
+    """Correct the cycles of a run, or of all runs with one doubt; or read a run's file again with another rig profile."""
+    if (run is None) == (not doubt) or (run is not None and (cycles is None) == (rig is None)):
+        raise typer.BadParameter("name a run with --cycles or --rig, or use --doubt CODE")
+    if run is None:
+        held_runs = service.pages(f"/v1/clutches/{clutch}/runs", state="held")
+        likely = {
+            item["run_id"]: notice["likely_cycles"]
+            for item in held_runs
+            for notice in item["doubts"]
+            if notice["code"] == doubt and notice.get("likely_cycles") is not None
+        }
+        if not likely:
+            print_line(f"{clutch} has no runs held for {doubt} with cycles that are likely")
+            return
+        for receipt in service.post(f"/v1/clutches/{clutch}/runs/correct", {"cycles": likely, "reason": reason})[
+            "items"
+        ]:
+            _show(receipt)
+        return
     change = {"rig": rig} if cycles is None else {"cycles": cycles}
     _show(service.patch(f"/v1/clutches/{clutch}/runs/{run}", change | {"reason": reason}))
 

@@ -372,7 +372,7 @@ def _left_open(bound: str, payload: Mapping[str, Any]) -> str:
     """An interval that reaches the horizon: its safe bound is the number that counts, and how probable an end is."""
     chance = chance_in_words(payload["probability_of_reaching"])
     within = f"the end comes within {payload.get('horizon_cycles', HORIZON):,.0f} cycles with a probability of {chance}"
-    return f"{bound}; the tests do not yet show how many more ({within})"
+    return f"{bound}; later tests will tell how many more ({within})"
 
 
 def bound_in_words(at_least: float | None) -> str:

@@ -146,7 +146,7 @@ def insufficient(assumptions: Assumptions, cycles: float | None, pressure: float
         at_least=None,
         probability_of_reaching=None,
         course=None,
-        back_cast=BackCastCount(held=0, of=0, widening=1.0),
+        back_cast=BackCastCount(held=0, of=0, widening=1.0, widening_later=1.0),
         ended_lives=0,
         ended=None,
         sample=None,

@@ -62,9 +62,11 @@ def missed(back_cast: BackCast) -> list[Notice]:
     """The warning of a clutch whose earlier forecasts held too few of the tests since."""
     if not back_cast.surprising:
         return []
+    earlier, later = back_cast.widening
     message = (
         f"the 90 % intervals of earlier forecasts contained only {back_cast.held} of {back_cast.misses.size} later tests. "
-        f"The interval of the remaining life is therefore {back_cast.widening:.2g} times as wide, on a logarithmic scale"
+        f"The interval of the remaining life is therefore {earlier:.2g} times as wide below its median and {later:.2g} "
+        "times above it, on a logarithmic scale"
     )
     return [Notice(code="missed_forecasts", message=message)]
 

@@ -269,6 +269,7 @@ def predict(
         CourseShare(name=share.name.value, probability=share.probability, order=share.order) for share in courses
     )
     mean, deviation = passage.current
+    earlier, later = back_cast.widening
     left = mean / passage.initial if passage.initial > 0 else None
     health = None if left is None else items.share_of_way(left, 1.0, fraction)
     now = {"mean_cof": mean, "mean_cof_sd": deviation, "fraction_of_initial": left, "health": health}
@@ -281,7 +282,9 @@ def predict(
         ),
         "end_of_life_cycles": items.by_quantile(ends),
         "probability_of_reaching": passage.probability_of_reaching,
-        "back_cast": BackCastCount(held=back_cast.held, of=back_cast.misses.size, widening=back_cast.widening),
+        "back_cast": BackCastCount(
+            held=back_cast.held, of=back_cast.misses.size, widening=earlier, widening_later=later
+        ),
         "ended_lives": end.lives,
         "sample": SampleQuality(effective_draws=sample.effective_draws, status=sample.status.value),
         "course": Course(**dict(course), alternatives=alternatives),
@@ -313,7 +316,7 @@ def end_of_life(
         as_of=as_of,
         horizon=max(horizon, as_of),
         offset=offset_of(series),
-        power=tracked.back_cast.widening,
+        powers=tracked.back_cast.widening,
         ended=series.assumptions.ended((series.quantity, series.pressure), fraction, series.scale),
         tests=series.measurements[: tracked.runs],
     )

@@ -1,6 +1,7 @@
 """`make plausibility`: what is held of campaigns with one slip each and of honest runs, as Markdown; fails below the demand.
 
 SEED= (1)   CAMPAIGNS= with one slip each, half of them a rig (200)   HONEST= honest runs (2000)
+CAUSES= dated lives with each cause of many runs, and three times as many without (40)
 LIVES= honest lives that are no eq. 6, of each kind (20)   ABLATED= campaigns a rig judged without each mechanism (60)
 STORE= a file of what was computed, to go on where a run was ended
 ARGS=--failures lists what was missed and what was held wrongly, ARGS=--write writes docs/appendix/plausibility.md
@@ -16,7 +17,7 @@ from functools import partial
 from typing import Any
 
 from tests.measuring import Asked, Lines, number, publish, table, wilson
-from tests.plausibility import slips, trials
+from tests.plausibility import counters, slips, trials
 from tests.plausibility.ablation import WITHOUT
 from tests.plausibility.bench import Answer
 from tests.plausibility.honest_lives import KINDS
@@ -24,6 +25,8 @@ from tests.plausibility.trials import Outcome
 
 #: The demand: of runs with a slip so many are held at least, of honest ones so many at most.
 LEAST_HELD, MOST_FALSE = 0.95, 0.005
+#: Of causes of many runs so many are found whole at least; of honest runs of dated lives so many are held at most.
+LEAST_FOUND, MOST_ASKED = 0.95, 0.01
 #: Of the runs of honest lives that are no eq. 6 so many are held in the end at most; of slips so many are out of the track
 #: after ten further runs at least.
 MOST_IN_THE_END, LEAST_AFTER = 0.01, 0.93
@@ -100,6 +103,24 @@ def by_life(lives: Mapping[str, Sequence[Mapping[str, int]]]) -> list[str]:
     return table(("honest lives", "runs", "held when they came in", "held in the end"), rows)
 
 
+def by_cause(found: Mapping[str, Sequence[Mapping[str, Any]]]) -> tuple[list[str], bool]:
+    """A row a cause of many runs, and whether the demand is met."""
+    rows, whole, lives, held, runs = [], 0, 0, 0, 0
+    for cause, mine in found.items():
+        own = sum(one["found"] == one["wrong"] for one in mine)
+        aside, honest = (sum(one[name] for one in mine) for name in ("honest held", "runs"))
+        honest -= sum(one["wrong"] for one in mine)
+        cells = f"{own} of {len(mine)}" if cause else ""
+        codes = sorted({code for one in mine for code in one["codes"]})
+        rows.append((cause or "none", cells, f"{aside} of {honest}", ", ".join(f"`{code}`" for code in codes)))
+        held, runs = held + aside, runs + honest
+        if cause:
+            whole, lives = whole + own, lives + len(mine)
+    rows.append(("**all** (demand: ≥ 95 %, ≤ 1 %)", percent(whole, lives), percent(held, runs), ""))
+    met = whole >= LEAST_FOUND * lives and held <= MOST_ASKED * runs
+    return table(("cause", "lives in which all of its runs are held", "other runs held in the end", "codes"), rows), met
+
+
 def _counted(title: str, outcomes: Sequence[Outcome], *demand: str) -> tuple[object, ...]:
     held = held_of(outcomes)
     return title, len(outcomes), held, percent(held, len(outcomes)), *demand
@@ -108,8 +129,8 @@ def _counted(title: str, outcomes: Sequence[Outcome], *demand: str) -> tuple[obj
 def main() -> int:
     """Print the tables; 1 where the demand is not met."""
     seed, store = Asked.here().seed, Lines(os.environ.get("STORE"))
-    sizes = {"CAMPAIGNS": 200, "HONEST": 2000, "LIVES": 20, "ABLATED": 60}
-    campaigns, runs, count, ablated = (number(name, size) for name, size in sizes.items())
+    sizes = {"CAMPAIGNS": 200, "HONEST": 2000, "LIVES": 20, "ABLATED": 60, "CAUSES": 40}
+    campaigns, runs, count, ablated, of_each = (number(name, size) for name, size in sizes.items())
 
     def known(label: str, make: Callable[..., Any], name: str, n: int, **how: bool) -> Any:
         """What comes of a trial, from the store or made."""
@@ -135,6 +156,14 @@ def main() -> int:
                 return found[:share]
         return found
 
+    causes = {
+        cause: [known("cause", counters.trial, cause, n) for n in range(of_each if cause else 3 * of_each)]
+        for cause in (*counters.CAUSES, "")
+    }
+    lines, found = by_cause(causes)
+    publish("plausibility.md", "counters", [f"`make plausibility SEED={seed} CAUSES={of_each}`:", "", *lines])
+    if not campaigns:
+        return 0 if found else 1
     rigs = {rig: many("slip", trials.slipped, [rig], campaigns // 2) for rig in trials.RIGS}
     wrong = [*itertools.chain(*rigs.values())]
     aside = many("aside", trials.aside, trials.RIGS, campaigns // 5)
@@ -180,7 +209,7 @@ def main() -> int:
         for one in (*[o for o in wrong if not o.held], *[o for o in honest if o.held]):
             said = (one.kind, one.cycles, one.before, one.answer.codes, one.answer.message)
             print("\n", one.slip or "honest", one.source, *said)
-    met = held_of(wrong) >= LEAST_HELD * len(wrong) and held_of(honest) <= MOST_FALSE * len(honest)
+    met = found and held_of(wrong) >= LEAST_HELD * len(wrong) and held_of(honest) <= MOST_FALSE * len(honest)
     met = met and in_the_end <= MOST_IN_THE_END * of_lives and out >= LEAST_AFTER * len(followed)
     return 0 if met else 1
 

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from functools import partial
 
 from tests.measuring import Asked, each, publish, where
-from tests.score import alarms, belief, filters, fleets, off_prior, paper
+from tests.score import alarms, belief, filters, fleets, off_prior, paper, starts
 
 
 def main() -> None:
@@ -28,6 +28,7 @@ def main() -> None:
         "exact": partial(filters.beside_exact, lives(100), seed + 1),
         "outlying": partial(filters.calibration, lives(1_000), seed + 2, outlying=0.1),
         "laws": partial(off_prior.laws, lives(100), seed + 3),
+        "starts": partial(starts.starts, lives(400), seed + 15),
         "never": partial(off_prior.never, lives(1_000), seed + 4),
         "events": partial(off_prior.after_event, lives(100), seed + 5),
         "fleets": partial(fleets.fleets, lives(40), seed + 6),

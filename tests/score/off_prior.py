@@ -10,6 +10,7 @@ import numpy as np
 from models.prognosis.first_passage import ends_of_life, predict_first_passage
 from models.rig.truth import draw
 from models.tracking.courses import FORM_COURSE, FORM_PROPORTIONAL, FORM_SIZE, coefficients_at, log_form_weight
+from models.tracking.criteria import KNEE_PACE, KNEE_PROBABILITY, LOG_KNEE_PACE_SD, UNSEEN_WEAR
 from models.tracking.discrepancy import FUTURE, PAST, CourseDiscrepancy
 from models.tracking.filters.grid import Grid
 from models.tracking.measurement import Measurement
@@ -58,7 +59,8 @@ def rig_lives(count: int, seed: int) -> list[tuple[Callable[[float], float], flo
 
 def never(count: int, seed: int) -> str:
     """Lives from the prior, whether they ever reach half of their COF or not: is the stated probability right? Once for
-    lives of eq. 6 alone, and once for lives of all that is believed: some with a discrepancy, some runs outlying."""
+    lives of eq. 6 alone, and once for lives of all that is believed: some with a discrepancy or a knee, some runs
+    outlying."""
     found = {"eq. 6 alone": stated(count, seed, whole=False), "the whole prior": stated(count, seed + 100, whole=True)}
     shares = ", ".join(f"{100 * np.mean(came):.0f} % of those of {name}" for name, (_, came) in found.items())
     edges, rows = np.array([0.0, 0.05, 0.2, 0.4, 0.6, 0.8, 0.95, 1.0 + 1e-9]), []
@@ -102,14 +104,16 @@ def stated(count: int, seed: int, *, whole: bool) -> tuple[np.ndarray, np.ndarra
                 continue
             truth = replace(truth, scale=scale, exponent=exponent)
             course = size * PRIOR.size * rng.standard_normal((1, PAST + FUTURE))
+            unworn = truth.initial[0] - truth.values(np.array([last]))[0, 0] < UNSEEN_WEAR * truth.initial[0]
+            knee = (size > 0.0 or unworn) and rng.random() < KNEE_PROBABILITY
             beside = CourseDiscrepancy(
                 span=last,
                 size=np.full(1, size),
                 curvature=course,
                 at=np.zeros(0),
                 height=np.zeros((1, 0)),
-                knee=np.full(1, np.inf),
-                steepening=np.ones(1),
+                knee=np.full(1, last / (1.0 - rng.random()) if knee else np.inf),
+                steepening=KNEE_PACE * np.exp(LOG_KNEE_PACE_SD * rng.standard_normal(1)),
             )
             truth = replace(truth, discrepancy=beside)
             if FORM_PROPORTIONAL[form]:

@@ -52,8 +52,8 @@ def forecast(tests: Sequence[Measurement], end: float, rng: np.random.Generator)
             back_cast = back_cast.forecast(posterior, test, prior)
         if count in stages:
             found: list[float] = []
-            for power in (1.0, back_cast.widening):
-                as_stated = stated_end(posterior, fraction=0.5, as_of=test.progress, horizon=HORIZON, power=power)
+            for powers in ((1.0, 1.0), back_cast.widening):
+                as_stated = stated_end(posterior, fraction=0.5, as_of=test.progress, horizon=HORIZON, powers=powers)
                 passage = predict_first_passage(
                     posterior, fraction=0.5, as_of=test.progress, stated=(as_stated.ends, as_stated.weight)
                 )

@@ -318,6 +318,7 @@ class Ukf:
         scale, exponent = coefficients(place, log_exponent, FORM_COURSE[form], state.reference)
         change = (at_reference - initial) / progress_fraction(state.reference, scale, exponent)
         ends = np.stack([discrepancy_terms[0], discrepancy_terms[1] * history.span / state.reference])
+        worn = -change * progress_fraction(history.span, scale, exponent) / initial
         sizes = FORM_SIZE[form]
         course = np.where(sizes[:, None] > 0.0, (np.linalg.pinv(value_and_slope_now()) @ ends).T, 0.0)
         heights = np.stack(discrepancy_terms[2:], axis=1) if len(discrepancy_terms) > 2 else np.zeros((size, 0))
@@ -331,7 +332,7 @@ class Ukf:
             exponent=exponent,
             scatter=np.sqrt(state.scatter[kind, 0]),
             proportional=FORM_PROPORTIONAL[form],
-            discrepancy=drawn(history, prior, sizes, np.concatenate([course, heights], axis=1), rng),
+            discrepancy=drawn(history, prior, sizes, np.concatenate([course, heights], axis=1), worn, rng),
         )
 
 

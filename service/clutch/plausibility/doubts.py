@@ -8,10 +8,23 @@ import bisect
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from datetime import UTC, datetime
 from functools import reduce
 
 from models.clutch import Geometry
 from models.plausibility import criteria
+from models.plausibility.common_causes import (
+    OFFSET,
+    RESTART,
+    ROLL_OVER,
+    STUCK,
+    TWO_CLUTCHES,
+    CommonCause,
+    common_cause_of,
+)
+from models.plausibility.common_causes import (
+    UNIT as OTHER_UNIT,
+)
 from models.plausibility.judgement import JointJudgement, SlipVerdict, judge
 from models.plausibility.slips import OF_CYCLES, OTHER_CYCLES, RunReading
 from service.channels import PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM, ZERO_CELSIUS
@@ -23,6 +36,8 @@ from service.errors import Notice
 
 OFF_PACE, AGAINST_TIME = "cycles_off_pace", "cycles_against_time"
 BEYOND_PHYSICS, OFF_COURSE = "cof_beyond_physics", "cof_off_course"
+#: Of many runs with one cause: a counter that changed, or runs of two clutches under one name.
+COUNTER, TWO_NAMES = "counter_changed", "two_clutches"
 UNIT = "unit"
 
 
@@ -49,6 +64,39 @@ def negative(cof: float) -> Notice:
         "Send the run with the right sign, or confirm it."
     )
     return Notice(code=BEYOND_PHYSICS, message=message)
+
+
+def common_doubts(cause: CommonCause, events: Sequence[Event]) -> dict[str, tuple[Notice, ...]]:
+    """The one doubt of all runs of a cause, by run_id, with the cycles that each was made at; `events` are all runs. The
+    question stays as it is while further runs join."""
+    own = [events[index] for index in cause.runs]
+    moment = datetime.fromtimestamp(own[0].moment, UTC)
+    day, since = f"{moment.day} {moment:%b %Y}", f"the runs since {own[0].run_id}"
+    reached, number = _number(cause.reached), _number(abs(cause.number))
+    question = {
+        RESTART: f"Did the counter restart at zero by {day}? Then {since} count from {number}",
+        ROLL_OVER: f"Did the counter roll over at {number} by {day}? Then {since} count from there",
+        OFFSET: f"Was the counter exchanged by {day}? By dates and pace {since} count {number} cycles "
+        f"{'too few' if cause.number > 0 else 'too many'}",
+        OTHER_UNIT: f"Is one of the counter {number} cycles since {day}? Then {since} count in another unit",
+        STUCK: f"Did the counter stand still at {reached} cycles from {day} on? Then {since} count by their dates",
+        TWO_CLUTCHES: f"Are runs since {own[0].run_id} on {day} another clutch's, or was the clutch rebuilt? By their dates "
+        f"they do not go with the others, which reach {reached} cycles",
+    }[cause.name]
+    doubts: dict[str, tuple[Notice, ...]] = {}
+    for event, cycles in zip(own, cause.cycles, strict=True):
+        if cause.name == TWO_CLUTCHES:
+            message = (
+                f"{question}. Withdraw them together, or send maintenance with the event rebuild, or confirm them."
+            )
+            doubts[event.run_id] = (Notice(code=TWO_NAMES, message=message),)
+            continue
+        message = (
+            f"{question}. {reached} cycles were reached before; this run, sent at {_number(event.cycles)}, would be at "
+            f"{_number(cycles)}. Correct them together, or confirm them."
+        )
+        doubts[event.run_id] = (Notice(code=COUNTER, message=message, likely_cycles=cycles),)
+    return doubts
 
 
 def _cycles_notice(verdict: SlipVerdict, sent: RunReading) -> Notice:
@@ -189,12 +237,22 @@ def doubts_together(
     place = {run.name: index for index, run in enumerate(runs)}
     cycles = [event.cycles for event in events]
     about = [min(bisect.bisect_left(cycles, event.cycles), len(events) - 1) for event in changed if events]
-    judgement = judge(runs, [*(place[event.run_id] for event in [*doubted, *new]), *about])
-    levels = _levels(events, judgement)
+    asked = [*(place[event.run_id] for event in [*doubted, *new]), *about]
+    judgement = judge(runs, asked)
     if incoming is None and not doubted:  # what somebody has changed is no reason to hold other runs
-        return Judged(levels=levels)
-    doubts = {
-        runs[index].name: (doubt(verdict, runs[index].sent, events[index].shown or Shown()),)
+        return Judged(levels=_levels(events, judgement))
+    doubts: dict[str, tuple[Notice, ...]] = {}
+    cause, judged_events = common_cause_of(runs), events
+    # of a single run its slips say more, unless the cause is more probable than they are
+    if cause is not None and (cause.log_odds > 0.0 or len(cause.runs) > 1):
+        doubts = common_doubts(cause, events)
+        left = [index for index in range(len(runs)) if runs[index].name not in doubts]
+        places = {index: k for k, index in enumerate(left)}
+        runs, judged_events = [runs[index] for index in left], tuple(events[index] for index in left)
+        judgement = judge(runs, [places[index] for index in asked if index in places])
+    levels = _levels(judged_events, judgement)
+    doubts |= {
+        runs[index].name: (doubt(verdict, runs[index].sent, judged_events[index].shown or Shown()),)
         for index, verdict in judgement.held.items()
     }
     back = tuple(event for event in doubted if event.run_id not in doubts)

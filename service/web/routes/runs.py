@@ -18,7 +18,18 @@ from service.answers import rigs, runs
 from service.answers.raw_run import Kind, copy_file, entity_tag, file_sha256, write_run
 from service.api import parameters
 from service.api.base import Origin
-from service.api.run import RUN_IN, Confirmation, Confirmations, Correction, Receipt, RunOut, RunPage, Withdrawal
+from service.api.run import (
+    RUN_IN,
+    Confirmation,
+    Confirmations,
+    Correction,
+    Corrections,
+    Receipt,
+    RunOut,
+    RunPage,
+    Withdrawal,
+    Withdrawals,
+)
 from service.changes import change_run
 from service.changes.ingest_run import ingest_posted
 from service.errors import NoRoomError, NotAcceptableError, NotFoundError
@@ -209,7 +220,47 @@ async def correct_run(of: responses.ChangeOf, run_id: parameters.RunId) -> Respo
         by, at = grant_of(of.request).name, responses.now()
         reread = partial(change_run.read_again, rig=correction.rig, reason=correction.reason, by=by, at=at)
         return responses.json_answer(await responses.changed(of, reread, run_id, of.context.folder))
-    return await _changed(of, changes.CORRECT, run_id, correction, cycles=correction.cycles)
+    return await _changed(of, changes.CORRECT, run_id, correction, cycles={run_id: correction.cycles})
+
+
+@router.post(
+    "/correct",
+    **responses.taking(
+        Corrections,
+        RunPage,
+        {"cycles": {"test-7000": 7000, "test-8000": 8000}, "reason": "the counter restarted at zero"},
+    ),
+)
+async def correct_runs(of: responses.ChangeOf) -> Response:
+    """Correct the cycles of several runs in one step. They are judged together: those that are plausible then count. If
+    one does not exist, none is corrected. The same with the cycles as sent undoes it.
+    """
+    corrections = await responses.sent(of.request, Corrections)
+    return await _changed(of, changes.CORRECT, list(corrections.cycles), corrections, cycles=corrections.cycles)
+
+
+@router.post(
+    "/withdraw",
+    **responses.taking(
+        Withdrawals, RunPage, {"run_ids": ["test-7000", "test-8000"], "reason": "they are another clutch's"}
+    ),
+)
+async def withdraw_runs(of: responses.ChangeOf) -> Response:
+    """Withdraw several runs in one step: they no longer count, but stay stored and listed."""
+    withdrawals = await responses.sent(of.request, Withdrawals)
+    return await _changed(of, changes.WITHDRAW, withdrawals.run_ids, withdrawals)
+
+
+@router.post(
+    "/restore",
+    **responses.taking(
+        Withdrawals, RunPage, {"run_ids": ["test-7000", "test-8000"], "reason": "they are this clutch's"}
+    ),
+)
+async def restore_runs(of: responses.ChangeOf) -> Response:
+    """Undo the withdrawal of several runs in one step: each is accepted or held again, as before."""
+    withdrawals = await responses.sent(of.request, Withdrawals)
+    return await _changed(of, changes.RESTORE, withdrawals.run_ids, withdrawals)
 
 
 @router.post(
@@ -252,7 +303,7 @@ async def _changed(
     of: responses.OfClutch,
     action: str,
     run_id: str | Sequence[str],
-    sent: Correction | Withdrawal | Confirmation | Confirmations,
+    sent: Correction | Corrections | Withdrawal | Withdrawals | Confirmation | Confirmations,
     **more: Any,
 ) -> Response:
     """The receipt after a change, or a list of them where it is of a list of runs."""

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from models.prognosis.course_shares import CourseName, course_shares
-from models.prognosis.first_passage import predict_first_passage
+from models.prognosis.first_passage import ends_of_life, predict_first_passage
 from models.tracking.courses import CourseForm
+from models.tracking.criteria import KNEE_PROBABILITY
 from models.tracking.filters.grid import Grid
 from models.tracking.filters.particle import Particle
 from models.tracking.filters.ukf import Ukf
@@ -67,9 +68,10 @@ def test_a_straight_line_is_neither() -> None:
 
 @TRACKERS
 def test_what_rises_faster_and_faster_is_no_end(tracker: Any) -> None:
-    """The accelerating life upside down: its cliff leads away from the threshold."""
+    """The accelerating life upside down: its cliff leads away from the threshold. Only wear that begins ahead ends it."""
     fresh, *rest = accelerating(0.8)
     rising = [fresh, *(replace(each, value=2.0 * fresh.value - each.value) for each in rest)]
-    passage = predict_first_passage(posterior_of(tracker, rising), fraction=0.5, as_of=8_000.0)
-    assert passage.probability_of_reaching < 0.1
-    assert passage.end_of_life[0.5] is None
+    posterior = posterior_of(tracker, rising)
+    ended, knee = np.isfinite(ends_of_life(posterior, 0.5)), np.isfinite(posterior.discrepancy.knee)
+    assert posterior.weight[ended & ~knee].sum() < 0.1
+    assert posterior.weight[knee].sum() == pytest.approx(KNEE_PROBABILITY, abs=0.05)

@@ -209,24 +209,31 @@ WEIGHT = np.full(3, 1.0 / 3.0)
 
 
 @pytest.mark.parametrize(
-    ("passages", "power", "stated"),
+    ("passages", "powers", "stated"),
     [
-        ([1_500.0, 2_000.0, 3_000.0], 2.0, [1_250.0, 2_000.0, 5_000.0]),
-        ([1_500.0, 2_000.0, 3_000.0], 1.0, [1_500.0, 2_000.0, 3_000.0]),
-        ([900.0, 2_000.0, math.inf], 2.0, [900.0, 2_000.0, math.inf]),
-        ([10_990.0, math.inf, math.inf], 2.0, [1_000.0 + 9_990.0**2 / 999_000.0, math.inf, math.inf]),
-        ([800.0, 900.0, 3_000.0], 2.0, [800.0, 900.0, 3_000.0]),
+        ([1_500.0, 2_000.0, 3_000.0], (2.0, 2.0), [1_250.0, 2_000.0, 5_000.0]),
+        ([1_500.0, 2_000.0, 3_000.0], (1.0, 1.0), [1_500.0, 2_000.0, 3_000.0]),
+        ([1_500.0, 2_000.0, 3_000.0], (1.0, 2.0), [1_500.0, 2_000.0, 5_000.0]),
+        ([1_500.0, 2_000.0, 3_000.0], (2.0, 1.0), [1_250.0, 2_000.0, 3_000.0]),
+        ([900.0, 2_000.0, math.inf], (2.0, 2.0), [900.0, 2_000.0, math.inf]),
+        ([10_990.0, math.inf, math.inf], (2.0, 2.0), [1_000.0 + 9_990.0**2 / 999_000.0, math.inf, math.inf]),
+        ([800.0, 900.0, 3_000.0], (2.0, 2.0), [800.0, 900.0, 3_000.0]),
     ],
-    ids=["about its median", "not at all", "what ended stays", "about the horizon", "a life that has ended"],
-)
-def test_remaining_life_is_wider_about_its_median(passages: list[float], power: float, stated: list[float]) -> None:
-    found = widened(np.array(passages), WEIGHT, as_of=1_000.0, horizon=1e6, power=power)
+    ids=[
+        "about its median", "not at all", "after it alone", "before it alone", "what ended stays", "about the horizon",
+        "a life that has ended",
+    ],
+)  # fmt: skip
+def test_remaining_life_is_wider_about_its_median(
+    passages: list[float], powers: tuple[float, float], stated: list[float]
+) -> None:
+    found = widened(np.array(passages), WEIGHT, as_of=1_000.0, horizon=1e6, powers=powers)
     assert found.tolist() == pytest.approx(stated)
 
 
 def test_what_becomes_wider_than_the_horizon_may_never_end() -> None:
     draws = sample([-1.0, -0.9, -0.505])
-    ends = widened(ends_of_life(draws, 0.5), draws.weight, as_of=10.0, horizon=1e6, power=20.0)
+    ends = widened(ends_of_life(draws, 0.5), draws.weight, as_of=10.0, horizon=1e6, powers=(20.0, 20.0))
     wide = predict_first_passage(draws, fraction=0.5, as_of=10.0, stated=(ends, draws.weight))
     assert (wide.end_of_life[0.95], wide.status) == (None, first_passage.PassageStatus.MAY_NEVER_REACH)
 

@@ -8,6 +8,7 @@ import pytest
 from scipy.stats import norm
 
 from models.prognosis.back_cast import BackCast, kept_after
+from models.prognosis.first_passage import weighted_quantiles
 from models.prognosis.scoring import (
     alpha_lambda,
     covered,
@@ -16,10 +17,11 @@ from models.prognosis.scoring import (
     pit_of_quantiles,
     prognostic_horizon,
 )
+from models.prognosis.stated_end import stated_end
 from models.tracking.measurement import Measurement
 from models.tracking.posterior import TrackPosterior
 from tests.models.prognosis.sample_scores import crps_of_sample, pit_of_sample
-from tests.models.tracking.tracked_series import PRIOR, draws_of
+from tests.models.tracking.tracked_series import PRIOR, draws_of, on_grid, sent
 
 # --- Scores against closed forms and hand-worked cases.
 
@@ -108,7 +110,7 @@ def forecast(posterior: TrackPosterior = FLAT) -> BackCast:
 
 def test_a_miss_is_counted_in_half_widths_of_the_interval() -> None:
     judged = forecast().judged(measured(1_500.0, 1.0 + 0.1 * 1.645)).judged(measured(1_600.0, 1.0 - 0.2 * 1.645))
-    np.testing.assert_allclose(judged.misses, [1.0, 2.0], rtol=0.02)
+    np.testing.assert_allclose(judged.misses, [1.0, -2.0], rtol=0.02)
     assert forecast().judged(measured(1_500.0, 60.0)).misses.tolist() == [3.0]  # however far off
     assert replace(judged, misses=np.array([0.9, 1.0, 1.1])).held == 2
     # scatter and the fits variance belong to the interval
@@ -133,10 +135,12 @@ def test_forecasts_are_kept_ever_more_seldom() -> None:
 
 @pytest.mark.parametrize(
     ("misses", "power"),
-    [([], 1.0), ([0.5], 1.0), ([0.5, 3.0], 3.0), ([0.1] * 8 + [5.0], 5.0), ([0.1] * 18 + [2.0, 5.0], 2.0)],
+    [([], 1.0), ([0.5], 1.0), ([0.5, 3.0], 3.0), ([0.1] * 18 + [5.0], 5.0), ([0.1] * 38 + [2.0, 5.0], 2.0)],
 )
-def test_the_power_is_the_conformal_quantile_of_the_misses(misses: list[float], power: float) -> None:
-    assert replace(BackCast.nothing(), misses=np.array(misses)).widening == power
+def test_the_power_is_the_conformal_quantile_of_the_misses_of_its_side(misses: list[float], power: float) -> None:
+    """Tests above their forecasts leave the safe bound as it is."""
+    assert replace(BackCast.nothing(), misses=np.array(misses)).widening == (1.0, power)
+    assert replace(BackCast.nothing(), misses=-np.array(misses)).widening == (power, 1.0)
 
 
 @pytest.mark.parametrize(
@@ -145,3 +149,20 @@ def test_the_power_is_the_conformal_quantile_of_the_misses(misses: list[float], 
 def test_few_that_held_are_a_surprise(held: int, count: int, surprising: bool) -> None:
     misses = np.array([0.5] * held + [2.0] * (count - held))
     assert replace(BackCast.nothing(), misses=misses).surprising is surprising
+
+
+def test_a_clutch_that_becomes_better_than_predicted_is_no_less_safe() -> None:
+    """Friction falls to 85 % of new and recovers to 94 %, above its forecasts: the safe bound stays that of the filter, of
+    the order of the cycles that were tested."""
+    share = np.array([1.0, 0.95, 0.91, 0.88, 0.86, 0.85, 0.86, 0.875, 0.89, 0.905, 0.92, 0.93, 0.935, 0.94])
+    rng = np.random.default_rng(3)
+    tests = sent(1_000.0 * np.arange(14), 0.1 * share * (1.0 + 0.002 * rng.standard_normal(14)), 1e-9)
+    back_cast = BackCast.nothing()
+    for count, test in enumerate(tests, start=1):
+        back_cast, posterior = back_cast.judged(test), on_grid(tests[:count], 1_000, rng)
+        if kept_after(count):
+            back_cast = back_cast.forecast(posterior, test, PRIOR)
+    assert back_cast.widening[1] > 2.0
+    stated = stated_end(posterior, fraction=0.5, as_of=13_000.0, horizon=1e6, powers=back_cast.widening, tests=tests)
+    bound = float(weighted_quantiles(np.minimum(stated.ends, 1e6), stated.weight, (0.05,))[0])
+    assert 15_000.0 < bound < 40_000.0

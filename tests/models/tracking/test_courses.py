@@ -1,5 +1,6 @@
 """Courses and their knees, the model's discrepancy, both as one linear model, priors and draws."""
 
+import itertools
 import math
 from dataclasses import asdict, fields, replace
 from typing import Any
@@ -8,11 +9,12 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
+from models.arrays import FloatArray
 from models.degradation.general_order import first_passage, progress_fraction
 from models.prognosis.first_passage import ends_of_life, predict_first_passage, weighted_quantiles
 from models.tracking import courses, linear_model, sampling
 from models.tracking.courses import CourseForm
-from models.tracking.criteria import KNEE_HAZARD
+from models.tracking.criteria import KNEE_PROBABILITY, UNSEEN_WEAR
 from models.tracking.discrepancy import PAST, drawn, smooth
 from models.tracking.filters.grid import Grid
 from models.tracking.filters.particle import Particle
@@ -148,25 +150,39 @@ def test_after_an_event_the_forecast_widens_and_then_settles(tracker: Any) -> No
 
 
 def test_a_course_goes_on_along_its_knee_from_there_on() -> None:
-    """From ζ = 1,500 on at four times the mean pace until then, which is a line's own; before, nothing changes."""
+    """From ζ = 1,500 on by four times the mean pace of wear until then, and a tenth of ξ0 counts as worn; before, nothing
+    changes. One that rises stays from there on and falls by that tenth alone."""
     course = beside(2, size=np.full(2, 0.01), knee=np.array([1_500.0, np.inf]), steepening=np.full(2, 4.0))
     line = draws_of(2, initial=0.1, change=-0.1, scale=-10_000.0, exponent=-1.0, discrepancy=course)
     at = np.array([0.0, 1_000.0, 1_500.0, 2_000.0])
-    np.testing.assert_allclose(line.values(at).T, [[0.1, 0.09, 0.085, 0.06], [0.1, 0.09, 0.085, 0.08]], atol=1e-12)
-    assert ends_of_life(line, 0.5) == pytest.approx([2_200.0, 5_000.0], rel=2e-3)
+    fallen = 4.0 * (0.015 + UNSEEN_WEAR * 0.1) / 1_500.0 * 500.0
+    np.testing.assert_allclose(
+        line.values(at).T, [[0.1, 0.09, 0.085, 0.08 - fallen], [0.1, 0.09, 0.085, 0.08]], atol=1e-12
+    )
+    assert ends_of_life(line, 0.5) == pytest.approx([1_500.0 + 0.035 / (1e-5 + fallen / 500.0), 5_000.0], rel=2e-3)
+    rising = draws_of(2, initial=0.1, change=0.1, scale=-10_000.0, exponent=-1.0, discrepancy=course)
+    fallen = 4.0 * UNSEEN_WEAR * 0.1 / 1_500.0 * 500.0
+    np.testing.assert_allclose(rising.values(at)[-1], [0.115 - fallen, 0.12], atol=1e-12)
 
 
-def test_knees_come_as_their_hazard_has_it_and_eq_6_alone_has_none() -> None:
+def test_knees_come_as_their_probability_has_it_and_eq_6_alone_has_none_once_it_wears() -> None:
     prior = weak(Measurement(progress=0.0, value=0.1, variance=0.0), falling=True)
     history = History.of(sent([0.0, 2_000.0], 0.1), prior)
-    sizes = np.repeat([0.0, 0.03], 20_000)
-    found = drawn(history, prior, sizes, np.zeros((sizes.size, PAST)), np.random.default_rng(4))
-    assert np.isinf(found.knee[:20_000]).all()
-    for ahead in (1.5, 3.0):
-        assert (found.knee[20_000:] > ahead * 2_000.0).mean() == pytest.approx(ahead**-KNEE_HAZARD, abs=0.015)
-    assert found.knee.min() >= 2_000.0
+    sizes, worn = np.repeat([0.0, 0.0, 0.03], 20_000), np.repeat([0.2, 0.05, 0.2], 20_000)
+
+    def knees(history: History, prior: TrackPrior) -> FloatArray:
+        return drawn(history, prior, sizes, np.zeros((sizes.size, PAST)), worn, np.random.default_rng(4)).knee
+
+    found = knees(history, prior)
+    assert np.isinf(found[:20_000]).all()
+    for ahead, some in itertools.product((1.5, 3.0, 1e6), (found[20_000:40_000], found[40_000:])):
+        expected = KNEE_PROBABILITY * (1.0 - 1.0 / ahead)
+        assert (some <= ahead * 2_000.0).mean() == pytest.approx(expected, abs=0.015)
+    assert found.min() >= 2_000.0
+    # before a second test there is no scale that they could have
+    assert np.isinf(knees(History.of(sent([0.0], 0.1), prior), prior)).all()
     parameter = weak(Measurement(progress=0.0, value=0.1, variance=0.0), falling=False)
-    assert np.isinf(drawn(history, parameter, sizes, np.zeros((sizes.size, PAST)), np.random.default_rng(4)).knee).all()
+    assert np.isinf(knees(history, parameter)).all()
 
 
 def test_the_first_signs_of_a_knee_move_the_answer_within_two_tests() -> None:

@@ -137,7 +137,7 @@ class Bench:
         return self._changed(run_id, action=changes.CONFIRM, reason="")
 
     def correct(self, run_id: str, cycles: float) -> dict[str, Any]:
-        return self._changed(run_id, action=changes.CORRECT, reason="a slip", cycles=cycles)
+        return self._changed(run_id, action=changes.CORRECT, reason="a slip", cycles={run_id: cycles})
 
     def _changed(self, run_id: str, **wanted: Any) -> dict[str, Any]:
         (receipt,) = change_run.change(self.database, CLUTCH, [run_id], **wanted, **WHO)

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -187,6 +188,49 @@ def test_several_held_runs_are_confirmed_in_one_step_or_none(benches: tuple[Benc
     for name in ("odd-1", "odd-2"):
         one_by_one.confirm(name)
     assert_same(together, one_by_one)
+
+
+def test_runs_after_a_counter_restarted_are_asked_about_once_mended_in_one_step_and_undone(tmp_path: Path) -> None:
+    """Tests every 500 cycles, two days apart; the counter is exchanged at 3,000 and begins at zero."""
+    with closing(Bench(tmp_path / "bench.db")) as bench:
+        _restarted(bench)
+
+
+def _restarted(bench: Bench) -> None:
+    for k in range(10):
+        cycles = 500.0 * k
+        sent = body("test", f"t{k}", cycles) | {"started_at": f"2026-03-{2 * k + 1:02d}T08:00:00+00:00"}
+        bench.send(sent | {"cycles": cycles if k < 6 else cycles - 3000.0})
+    before = bench.receipts()
+    held = [name for name, receipt in before.items() if receipt["state"] == "held"]
+    assert sorted(held) == ["t6", "t7", "t8", "t9"]
+    (doubts,) = {receipt["doubts"][0]["message"].partition("?")[0] for name, receipt in before.items() if name in held}
+    assert doubts == "Did the counter restart at zero by 13 Mar 2026"
+    likely = {name: float(before[name]["doubts"][0]["likely_cycles"]) for name in held}
+    assert likely == {f"t{k}": 500 * k for k in range(6, 10)}
+    who = {"reason": "it was exchanged", "by": "me", "at": AT}
+    revision = revision_of(bench)
+    mended = change_run.change(bench.database, CLUTCH, held, action=changes.CORRECT, cycles=likely, **who)
+    assert {one["run_id"]: (one["state"], one["cycles"]) for one in mended} == {
+        name: ("accepted", cycles) for name, cycles in likely.items()
+    }
+    assert revision_of(bench) == revision + 1
+    sent_cycles = {name: float(before[name]["cycles"]) for name in held}
+    undone = change_run.change(bench.database, CLUTCH, held, action=changes.CORRECT, cycles=sent_cycles, **who)
+    assert {one["run_id"]: (one["state"], one["doubts"]) for one in undone} == {
+        name: ("held", before[name]["doubts"]) for name in held
+    }
+
+
+def test_several_runs_are_withdrawn_and_restored_in_one_step(bench: Bench) -> None:
+    bench.send_tests(0, 1000, 2000)
+    names, who = ["a1000", "a2000"], {"reason": "another clutch's", "by": "me", "at": AT}
+    before = bench.receipts()
+    out = change_run.change(bench.database, CLUTCH, names, action=changes.WITHDRAW, **who)
+    assert [one["state"] for one in out] == ["withdrawn", "withdrawn"]
+    back = change_run.change(bench.database, CLUTCH, names, action=changes.RESTORE, **who)
+    assert [one["state"] for one in back] == ["accepted", "accepted"]
+    assert bench.receipts() == before
 
 
 def test_what_was_sent_stays_what_was_sent(bench: Bench, tmp_path: Path) -> None:

@@ -214,7 +214,7 @@ def advising(test: str, effect: str) -> LatestDiagnosis:
         (
             summary(9450.0, status="may_never_reach", pace=PACE), None,
             "Normal: safe for 9,400 more cycles (95 %): 9 days at the pace so far, counted from the last run on "
-            "1 Dec 2026; the tests do not yet show",
+            "1 Dec 2026; later tests will tell",
             "Nothing to do: carry on testing.",
         ),
         (

@@ -144,26 +144,49 @@ const ANSWERS = {
   other: (run) => turnRun("withdraw", run, "another clutch's run"),
 };
 
-/** @type {(answer: Answer, runs: Receipt[]) => Promise<Done>} confirmed together, otherwise one after the other */
+/** @type {(runs: Receipt[], change: "confirm" | "withdraw" | "restore", reason: string) => Promise<Receipt>} */
+const changeAll = ([first, ...rest], change, reason) =>
+  post(`${clutchPath(first.clutch_id)}/runs/${change}`, { run_ids: [first, ...rest].map((run) => run.run_id), reason });
+
+/** @type {(runs: Receipt[], cycles: Record<string, number>, reason: string) => Promise<Done>} */
+async function correctAll(runs, cycles, reason) {
+  await post(`${clutchPath(runs[0].clutch_id)}/runs/correct`, { cycles, reason });
+  const before = Object.fromEntries(runs.map((run) => [run.run_id, run.cycles]));
+  const after = runs.map((run) => ({ ...run, cycles: cycles[run.run_id] }));
+  return {
+    text: `${runs.length} runs are corrected.`,
+    undo: () => correctAll(after, before, "the correction is undone"),
+  };
+}
+
+/** @type {(turn: keyof typeof TURNS, runs: Receipt[], reason: string) => Promise<Done>} */
+async function turnAll(turn, runs, reason) {
+  const { past, noun, back } = TURNS[turn];
+  await changeAll(runs, turn, reason);
+  return { text: `${runs.length} runs are ${past}.`, undo: () => turnAll(back, runs, `the ${noun} is undone`) };
+}
+
+/** @type {Record<Answer, (runs: Receipt[]) => Promise<Done>>} */
+const ANSWERS_OF_ALL = {
+  right: async (runs) => {
+    await changeAll(runs, "confirm", "");
+    return { text: `${runs.length} runs are confirmed.`, undo: null };
+  },
+  likely: (runs) => {
+    const cycles = Object.fromEntries(runs.map((run) => [run.run_id, likelyCycles(run) ?? run.cycles]));
+    return correctAll(runs, cycles, "wrong cycles, as the doubt suggests");
+  },
+  other: (runs) => turnAll("withdraw", runs, "another clutch's runs"),
+};
+
+/** @type {(answer: Answer, runs: Receipt[]) => Promise<Done>} several in one step */
 export async function answerDoubts(answer, runs) {
-  const several = runs.length > 1;
-  let changed = 0;
   try {
-    if (answer === "right" && several) {
-      const run_ids = runs.map((run) => run.run_id);
-      await post(`${clutchPath(runs[0].clutch_id)}/runs/confirm`, { run_ids, reason: "" });
-      return { text: `${runs.length} runs are confirmed.`, undo: null };
-    }
-    for (const run of runs) {
-      const done = await ANSWERS[answer](run);
-      if (!several) return done;
-      changed += 1;
-    }
+    return await (runs.length > 1 ? ANSWERS_OF_ALL[answer](runs) : ANSWERS[answer](runs[0]));
   } catch (problem) {
     if (!(problem instanceof Problem)) throw problem;
-    return { text: `${changed} of ${runs.length} runs were changed: ${problem.detail}`, undo: null };
+    return { text: `Nothing was changed: ${problem.detail}`, undo: null };
   }
-  return { text: `${runs.length} runs were changed.`, undo: null };
 }
 
 /** @type {(run: Receipt) => Promise<Question>} */

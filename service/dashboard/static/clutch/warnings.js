@@ -4,7 +4,7 @@
 import { doubtList } from "../sending/receipt.js";
 import { button, h, quiet } from "../shared/dom.js";
 import { fixed, kindName, moment, sentence, words } from "../shared/format.js";
-import { actionsOf, answerDoubts, answersOf, askRun, LABELS } from "./changes.js";
+import { actionsOf, answerDoubts, answersOf, askRun, LABELS, likelyCycles } from "./changes.js";
 
 /** @import { Page } from "./clutch.js" */
 
@@ -99,6 +99,8 @@ function together(runs, done) {
         "div.row.buttons.start",
         h("span", `${alike.length} runs for the same reason:`),
         button(`All ${alike.length} are right`, () => done(answerDoubts("right", alike))),
+        alike.every((run) => likelyCycles(run) !== undefined) &&
+          button(`Correct all ${alike.length}`, () => done(answerDoubts("likely", alike)), { class: "main" }),
         button(`All ${alike.length} are another clutch’s`, () => done(answerDoubts("other", alike))),
       ),
     );

@@ -1,0 +1,279 @@
+"""One cause of many runs: a counter that changes from some run on, or runs of two clutches under one name.
+
+Judged one by one, two runs with the same cause agree with each other, and are believed against dates and course. Here a
+hypothesis is about a cause of runs in the order of their dates, and costs its prior once, however many it explains:
+
+- the counter restarts at zero:    ζ = sent + b, b the cycles that were reached by then
+- it rolls over at M:              ζ = sent + M, 2 M after the next one, …; M is 2^16 or a power of ten
+- another counter takes over:      ζ = sent + b with any b
+- it counts in another unit:       ζ = f · sent
+- it stands still:                 ζ by the dates or evenly, between the runs before and after or at the pace until then
+- the runs are another clutch's:   they leave the history, and have a course of their own
+
+Each is weighed against the runs as they were sent, slips of single ones among them, by the judgement's own probability of
+course, cycles and dates (`judgement.log_probability_of`), and by the pace in time: of steps from run to run that are faster
+than those before, by z deviations of the logarithm, a factor (1 + z²/ν)^-(ν + 1)/2. A rig may idle at any time, but it does
+not suddenly make thirty times as many cycles a day. Of a counter that stands still course alone decides: the cycles that
+were sent are the same.
+
+Only runs that say when they were started are asked about. One that somebody confirmed is as it was sent, and so are those
+that go with it.
+"""
+
+import bisect
+import itertools
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from models.plausibility import criteria
+from models.plausibility.judgement import log_cycles_of, log_probability_of
+from models.plausibility.pace import log_anywhere
+from models.plausibility.slips import Run
+
+#: What may have happened to a counter; the last one is no counter's doing.
+RESTART, ROLL_OVER, OFFSET, UNIT, STUCK, TWO_CLUTCHES = (
+    "restart",
+    "roll_over",
+    "offset",
+    "unit",
+    "stuck",
+    "two_clutches",
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CommonCause:
+    """A cause, the log of its prior odds, and the indices of the runs that it concerns, by their dates, with the cycles that
+    each was made at (of another clutch's those sent). `number` is what the cause is about: b, M or f; `reached` the cycles
+    of the runs before it; `log_odds` those against all runs as they were sent, slips of single ones among them."""
+
+    name: str
+    log_prior: float
+    runs: tuple[int, ...]
+    cycles: tuple[float, ...]
+    number: float = 0.0
+    reached: float = 0.0
+    log_odds: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Dated:
+    """A run by its date: its place in the history, when it was started [s], the cycles at its start and end, and whether it
+    is a stationary test."""
+
+    index: int
+    moment: float
+    start: float
+    end: float
+    is_test: bool
+
+
+def common_cause_of(runs: Sequence[Run]) -> CommonCause | None:
+    """The most probable cause of many runs, in the order of the history; None where the odds of all of them are below
+    those from which a run is held."""
+    dated = _by_date(runs)
+    found = [cause for cause in _hypotheses(dated) if not any(runs[index].fixed for index in cause.runs)]
+    if not found:
+        return None
+    near = _near(dated, found)
+    as_sent = _log_probability([runs[index] for index in near])
+    log_odds = [cause.log_prior + _log_given(runs, near, cause) - as_sent for cause in found]
+    total = float(np.logaddexp.reduce(log_odds))
+    return None if total < math.log(criteria.HELD) else replace(found[int(np.argmax(log_odds))], log_odds=total)
+
+
+def _by_date(runs: Sequence[Run]) -> list[_Dated]:
+    dated = [
+        _Dated(index=index, moment=run.moment, start=run.cycles - (run.block or 0.0), end=run.cycles, is_test=run.tests)
+        for index, run in enumerate(runs)
+        if run.moment is not None
+    ]
+    return sorted(dated, key=lambda run: (run.moment, run.start, run.index))
+
+
+def _near(dated: Sequence[_Dated], found: Sequence[CommonCause]) -> list[int]:
+    """The runs that all hypotheses are weighed by: those dated about the first of each, as many as can be looked at."""
+    place = {run.index: k for k, run in enumerate(dated)}
+    firsts = [place[cause.runs[0]] for cause in found]
+    low, high = max(min(firsts) - criteria.LOOKED_BACK, 0), max(firsts) + criteria.LOOKED_BACK
+    return sorted(run.index for run in dated[low:high])
+
+
+def _log_given(runs: Sequence[Run], near: Sequence[int], cause: CommonCause) -> float:
+    """Log probability of the runs `near` under a hypothesis."""
+    made_at = dict(zip(cause.runs, cause.cycles, strict=True))
+    sent = [runs[index] for index in near]
+    if cause.name == TWO_CLUTCHES:
+        parts = ([index for index in near if (index in made_at) is other] for other in (False, True))
+        return sum(_log_probability([runs[index] for index in part]) for part in parts if part)
+    moved = [runs[index].at(made_at[index]) if index in made_at else runs[index] for index in near]
+    if cause.name == STUCK:
+        moved = _ordered(moved)
+        return log_probability_of(moved) - log_cycles_of(moved) + log_cycles_of(sent) + _log_pace(_by_date(sent))
+    return _log_probability(moved)
+
+
+def _log_probability(runs: Sequence[Run]) -> float:
+    ordered = _ordered(runs)
+    return log_probability_of(ordered) + _log_pace(_by_date(ordered))
+
+
+def _ordered(runs: Sequence[Run]) -> list[Run]:
+    return sorted(runs, key=lambda run: (run.cycles, run.moment or 0.0))
+
+
+def _steps(dated: Sequence[_Dated]) -> Iterator[tuple[int, float]]:
+    """The place of each run that was made further on than all before it, and the log of its cycles a second since."""
+    furthest = 0
+    for k in range(1, len(dated)):
+        cycles, seconds = dated[k].start - dated[furthest].start, dated[k].moment - dated[furthest].moment
+        if cycles > 0.5:
+            if seconds > criteria.LEAST_SECONDS:
+                yield k, math.log(cycles / seconds)
+            furthest = k
+
+
+def _excess(dated: Sequence[_Dated]) -> Iterator[tuple[int, float]]:
+    """The place of each step, and how many deviations it is faster than those before it."""
+    rates: list[float] = []
+    for k, rate in _steps(dated):
+        if len(rates) >= criteria.FEWEST_RATES:
+            middle, usual = np.quantile(rates, [0.5, 0.75]).tolist()
+            scatter = max(float(np.std([each for each in rates if each >= middle])), criteria.LEAST_RATE_SD)
+            yield k, (rate - usual) / scatter
+        rates = [*rates[1 - criteria.LOOKED_BACK :], rate]
+
+
+def _log_pace(dated: Sequence[_Dated]) -> float:
+    freedom = criteria.RATE_FREEDOM
+    return -0.5 * (freedom + 1.0) * sum(math.log1p(z * z / freedom) for _, z in _excess(dated) if z > 0.0)
+
+
+def _usual_rate(dated: Sequence[_Dated]) -> float | None:
+    """Cycles a second from run to run; None where no two were made apart."""
+    rates = [rate for _, rate in _steps(dated)]
+    return math.exp(float(np.median(rates))) if rates else None
+
+
+def _hypotheses(dated: Sequence[_Dated]) -> Iterator[CommonCause]:
+    furthest, fast = 0.0, {k for k, z in _excess(dated) if z > criteria.FAST}
+    asked = 0
+    for k, run in enumerate(dated):
+        fallen = k > 0 and run.start < furthest - 0.5
+        if (fallen and dated[k - 1].start >= run.start + 0.5) or k in fast:
+            asked += 1
+            if asked <= criteria.MOST_ASKED:
+                yield from _from_here_on(dated, k)
+        furthest = max(furthest, run.start)
+    yield from _standing(dated)
+    yield from _other_clutch(dated)
+
+
+def _from_here_on(dated: Sequence[_Dated], k: int) -> Iterator[CommonCause]:
+    """The counter changes before the k-th run by date."""
+    before, after = dated[:k], dated[k:]
+    reached, first = max(run.end for run in before), after[0]
+    rate = _usual_rate(before)
+    seconds = first.moment - before[-1].moment
+    due = reached + (0.0 if rate is None else rate * max(seconds, 0.0))
+    due_offset = round(due - first.start)
+    changes: list[tuple[str, float, float]] = []
+    if first.start < reached:
+        largest = [at for at in criteria.ROLLS_OVER_AT if at > reached]
+        changes += [(ROLL_OVER, math.log(criteria.COUNTER_ROLLS_OVER), at) for at in largest]
+        half = math.log(0.5 * criteria.COUNTER_RESTARTS)
+        changes += [(RESTART, half, float(b)) for b in {round(reached), due_offset} if b > 0]
+    if abs(due_offset) > 0.5:
+        log_prior = math.log(criteria.COUNTER_CHANGED) + float(log_anywhere(abs(due_offset)))
+        changes.append((OFFSET, log_prior, float(due_offset)))
+    of_unit = math.log(criteria.COUNTER_CHANGED / len(criteria.UNITS_OF_CYCLES))
+    changes += [(UNIT, of_unit, factor) for factor in criteria.UNITS_OF_CYCLES]
+    known: set[tuple[float, ...]] = set()  # a restart where a counter rolls over is no other cause
+    for name, log_prior, number in changes:
+        cycles = tuple(_counted(name, number, after))
+        start = cycles[0] - (first.end - first.start)
+        if start >= dated[k - 1].start - 0.5 and min(cycles) >= 0.0 and cycles not in known:
+            known.add(cycles)
+            indices = tuple(run.index for run in after)
+            yield CommonCause(
+                name=name, log_prior=log_prior, runs=indices, cycles=cycles, number=number, reached=reached
+            )
+
+
+def _counted(name: str, number: float, after: Sequence[_Dated]) -> Iterator[float]:
+    """The cycles that runs were made at after a change of the counter."""
+    turns, before = 1, -math.inf
+    for run in after:
+        if name == UNIT:
+            yield run.end * number
+            continue
+        turns += name == ROLL_OVER and run.start < before - 0.5
+        before = run.start
+        yield run.end + number * turns
+
+
+def _standing(dated: Sequence[_Dated]) -> Iterator[CommonCause]:
+    """The counter stands still between tests at the same cycles."""
+    dated = [run for run in dated if run.is_test]
+    for _, group in itertools.groupby(enumerate(dated), key=lambda placed: placed[1].end):
+        alike = list(group)
+        first, last = alike[0][0], alike[-1][0]
+        if last < first + 2 or dated[last].moment - dated[first].moment <= criteria.LEAST_SECONDS:
+            continue
+        later = next((run for run in dated[last + 1 :] if run.start > dated[last].end + 0.5), None)
+        rate = _usual_rate(dated[: first + 1])
+        if later is not None:
+            rate = (later.start - dated[first].end) / (later.moment - dated[first].moment)
+        if rate is None or rate <= 0.0:
+            continue
+        at = dated[first]
+        stood = [run for _, run in alike[1:]]
+        seconds = [run.moment - at.moment for run in stood]
+        until = later.moment - at.moment if later is not None else seconds[-1] * (1.0 + 1.0 / len(stood))
+        evenly = [until * (n + 1) / (len(stood) + 1) for n in range(len(stood))]
+        for spread in (seconds, evenly):  # a rig may idle between
+            yield CommonCause(
+                name=STUCK,
+                log_prior=math.log(0.5 * criteria.COUNTER_STANDS),
+                runs=tuple(run.index for run in stood),
+                cycles=tuple(float(round(at.end + rate * each)) for each in spread),
+                reached=at.end,
+            )
+
+
+def _other_clutch(dated: Sequence[_Dated]) -> Iterator[CommonCause]:
+    """The fewest runs without which cycles do not fall from date to date."""
+    if all(earlier.start <= later.start for earlier, later in itertools.pairwise(dated)):
+        return
+    own = _longest_rise([run.start for run in dated])
+    if 0 not in own:  # the clutch is the one whose runs came first
+        own = set(range(len(dated))) - own
+    other = [run for k, run in enumerate(dated) if k not in own]
+    if 2 <= len(other) < len(dated) - 2:
+        yield CommonCause(
+            name=TWO_CLUTCHES,
+            log_prior=math.log(criteria.TWO_CLUTCHES),
+            runs=tuple(run.index for run in other),
+            cycles=tuple(run.end for run in other),
+            reached=max(run.end for k, run in enumerate(dated) if k in own),
+        )
+
+
+def _longest_rise(values: Sequence[float]) -> set[int]:
+    """The places of a longest subsequence that does not fall."""
+    lowest: list[float] = []  # the least value that ends a rise of each length, and where
+    ends: list[int] = []
+    before: list[int] = []
+    for k, value in enumerate(values):
+        length = bisect.bisect_right(lowest, value)
+        before.append(ends[length - 1] if length else -1)
+        lowest[length : length + 1], ends[length : length + 1] = [value], [k]
+    places: set[int] = set()
+    k = ends[-1] if ends else -1
+    while k >= 0:
+        places.add(k)
+        k = before[k]
+    return places
