@@ -80,7 +80,7 @@ def preview(
     from_profile = Named() if profile is None else named(profile, filename, shown["labels"])
     used = _by_titles(shown) if profile is None else profile
     if used is not None:
-        stated = {name: value for name in ("decimal", "missing") if (value := getattr(reading, name))}
+        stated = {name: value for name in ("decimal", "missing", "good") if (value := getattr(reading, name))}
         used = used.model_copy(update=stated)
         if reading.mapping and (titled := _by_titles(shown)):
             used = used.model_copy(update={"columns": titled.columns})

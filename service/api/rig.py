@@ -63,6 +63,11 @@ class RigProfile(Schema):
         description="Marks of missing values, such as `-9999,n/a`: rows with one, or with an empty cell, are left"
         " out; `none`: all numbers are measurements; null: a file with suspicious numbers is refused",
     )
+    good: Text | None = Field(
+        default=None,
+        description="The codes of a column of qualities that mark good rows, such as `0` or `192`: other rows are left out;"
+        " `none`: all rows are read; null: a file with codes of unknown meaning is refused",
+    )
     kind: FileKindName | None = Field(
         default=None, description="The kind of run; null: from `file_name` or from the request"
     )

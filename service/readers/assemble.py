@@ -30,7 +30,7 @@ from service.readers.limits import Limits
 from service.readers.long_table import says_valid, valid_rows, widened
 from service.readers.missing_values import drop_totals, mask_stated_marks, refuse_stand_ins
 from service.readers.numerals import empty_cells, plain, read_cells
-from service.readers.table import NO_MISSING, NO_TIME, Clock, FileColumn, Reading, Table, index_of_wanted, labels, marks
+from service.readers.table import NO_TIME, Clock, FileColumn, Reading, Table, index_of_wanted, labels, marks
 
 #: The code of the notice that lists unused columns.
 LEFT_OUT = "columns_left_out"
@@ -92,9 +92,10 @@ def to_channels(table: Table, reading: Reading, limits: Limits) -> Channels:
     try:
         check_columns(columns, line_of=line_of)
     except InvalidError as error:
-        if not error.errors or error.errors[0].value != "nan":
+        value = error.errors[0].value if error.errors and error.errors[0].code == "not_finite" else ""
+        if not value:
             raise
-        detail = f"{error.detail}: add missing=nan to leave such rows out"
+        detail = f"{error.detail}: add missing={value} to leave such rows out"
         raise InvalidError(detail, errors=error.errors, total=error.total) from None
     _refuse_standing(columns)
     return Channels(columns=columns, notices=tuple(notices), counts=counts, labels=labels(table.above))
@@ -199,15 +200,15 @@ def _read(
     if stated > limits.most_values:
         raise TooLargeError(f"a file must not hold more than {limits.most_values} values, got {stated}")
     channels = {column.index: column.channel for column in chosen}
-    says = [] if reading.missing == NO_MISSING else [i for i, own in enumerate(table.columns) if says_valid(own)]
+    says = [index for index, column in enumerate(table.columns) if says_valid(column, reading)]
     parts = {}
     if reading.time != NO_TIME and "time_s" in channels.values():
         unused = {at: own for at, own in enumerate(table.columns) if at not in indices}
         parts = {at: factor for at, own in unused.items() if (factor := part_of_second(own))}
     read = read_cells(table, dict.fromkeys(says, "") | dict.fromkeys(parts, "time_s") | channels, reading)
+    read |= {index: mask_stated_marks(read[index], reading) for index in indices}
     read, table = drop_totals(read, [column.index for column in chosen if column.channel != "time_s"], table)
     for column in chosen:
-        read[column.index] = mask_stated_marks(read[column.index], reading)
         refuse_stand_ins(column.channel, read[column.index], table.line_of, reading)
     values: dict[int, FloatArray] = {}
     valid: dict[int, NDArray[np.bool_] | None] = {}
@@ -227,7 +228,7 @@ def _read(
     clocks = {} if reading.time == NO_TIME else _clocks(table.columns, chosen, values)
     used = {clock.key: clock for clock in clocks.values() if clock is not None}
     times = {key: clock.read() for key, clock in used.items()}
-    marked = [valid_rows(table.columns[index], read[index]) for index in says if index in read]
+    marked = [valid_rows(table.columns[index], read[index], reading) for index in says if index in read]
     series = {}
     for column in chosen:
         if column.channel != "time_s":

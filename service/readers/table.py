@@ -41,7 +41,8 @@ class Reading:
     `mapping`: channel -> its column; `only_named`: no other column is taken. `table`: the sheet, group or archived file.
     `time`: the title of the time column, or NO_TIME. `decimal`: the decimal sign, "." or ",". `skip_rows`: lines above that
     are not looked at. `missing`: marks of values that are missing, such as `-9999,n/a`; where any is given, rows without a
-    value are left out; NO_MISSING: every number is a measurement.
+    value are left out; NO_MISSING: every number is a measurement. `good`: codes of a column of qualities that mark good
+    rows, such as `0` or `192`; NO_MISSING: all rows are read.
     """
 
     mapping: Mapping[str, ColumnChoice] = field(default_factory=dict)
@@ -51,6 +52,7 @@ class Reading:
     decimal: str = ""
     skip_rows: int = 0
     missing: str = ""
+    good: str = ""
 
 
 @dataclass(frozen=True, slots=True)
