@@ -234,8 +234,10 @@ def is_blank(row: Row) -> bool:
 
 
 def is_value(cell: Any) -> bool:
-    """Whether a cell is a number or a point in time."""
+    """Whether a cell is a number or a point in time, or a formula for one that no program has computed."""
     if isinstance(cell, str):
+        if cell[:1] == "=" != cell:
+            return True
         return bool(cell) and (NUMERIC.fullmatch(cell) is not None or is_stamp(cell) or bool(with_unit_apart(cell)[1]))
     return cell is not None and not isinstance(cell, bool)
 
