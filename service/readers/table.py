@@ -59,12 +59,14 @@ class Reading:
 class Clock:
     """The times of a column by the recorder's own clock. Columns whose `key` is equal share it; `read` gives [n] s.
 
-    `counts`: the clock may be a default that only counts samples, a second each.
+    `counts`: the clock may be a default that only counts samples, a second each. `own`: the file states it for this column,
+    whatever columns of times stand beside it.
     """
 
     key: object
     read: Callable[[], FloatArray]
     counts: bool = False
+    own: bool = False
 
 
 @dataclass(frozen=True, slots=True)
