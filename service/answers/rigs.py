@@ -14,7 +14,7 @@ from models.records.plateaus import cut_plateaus
 from models.records.pressure_levels import pressure_stretches
 from service import repository
 from service.api.clutch import ClutchIn
-from service.api.rig import RigOut, RigProfile
+from service.api.rig import RigColumn, RigOut, RigProfile
 from service.channels import CHANNELS, RADIANS_PER_SECOND_PER_RPM, bar
 from service.clutch.analysis import analyse
 from service.clutch.incoming_run import IncomingRun, SampledChannels
@@ -83,7 +83,8 @@ def preview(
         stated = {name: value for name in ("decimal", "missing", "good") if (value := getattr(reading, name))}
         used = used.model_copy(update=stated)
         if reading.mapping and (titled := _by_titles(shown)):
-            used = used.model_copy(update={"columns": titled.columns})
+            of_file = [column for column in titled.columns if not column.title.startswith("=")]
+            used = used.model_copy(update={"columns": of_file + _stated_without_column(reading)})
     kind, cycles = kind or from_profile.kind, from_profile.cycles if cycles is None else cycles
     by_titles = profile is None and shown["problem"] is None  # as a push reads it; else with what is open left open
     read_by = reading_with(None if by_titles else used, reading if by_titles else Reading())
@@ -159,6 +160,15 @@ def _by_titles(shown: Mapping[str, Any]) -> RigProfile | None:
     return RigProfile.model_validate({"columns": list(columns.values())})
 
 
+def _stated_without_column(reading: Reading) -> list[RigColumn]:
+    """The channels of a map that no column holds, as columns of a profile."""
+    return [
+        RigColumn.model_validate({"title": choice.column, "channel": channel})
+        for channel, choice in reading.mapping.items()
+        if choice.column.startswith("=")
+    ]
+
+
 def _column(column: Mapping[str, Any], profile: RigProfile | None) -> dict[str, Any]:
     title = _title(column)
     profile_column = next((item for item in profile.columns if item.title == title), None) if profile else None
@@ -184,7 +194,9 @@ def _saveable(
         "file_name": profile_fields.get("file_name") or pattern_for(filename, cycles),
         "kind": profile_fields.get("kind") or kind,
     }
+    titles = [title for title in titles if not title.startswith("=")]
     columns = [profile_columns.get(title, {"title": title, "channel": None}) for title in titles]
+    columns += [column for title, column in profile_columns.items() if title.startswith("=")]
     fields = profile_fields | suggested | {"columns": columns}
     return {name: value for name, value in fields.items() if name in RigProfile.model_fields}
 

@@ -22,7 +22,8 @@ class RigColumn(Schema):
     """One column of the rig's files: a channel, or a column to ignore."""
 
     title: Annotated[str, StringConstraints(min_length=1, max_length=base.LONGEST_TITLE)] = Field(
-        description="Its title in the file, without the unit; `group/title` in files with groups"
+        description="Its title in the file, without the unit; `group/title` in files with groups. Of a channel without a"
+        " column `=5 bar`, `=LABEL` of a cell above the table, `=columns` or `=sheets` (a value in their names)"
     )
     channel: ChannelName | None = Field(default=None, description="The channel; null: ignore the column")
     unit: Text | None = Field(default=None, description="Its unit; null: the unit in the file")

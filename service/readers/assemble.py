@@ -27,6 +27,7 @@ from service.readers.column_names import (
     part_of_second,
     several_times,
 )
+from service.readers.constants import constants, stacked_columns
 from service.readers.limits import Limits
 from service.readers.long_table import says_valid, valid_rows, widened
 from service.readers.missing_values import drop_totals, mask_stated_marks, refuse_stand_ins
@@ -83,12 +84,15 @@ def to_channels(table: Table, reading: Reading, limits: Limits) -> Channels:
     Raises InvalidError where a unit or a clock is not clear, a value is no number, or nothing is known; TooLargeError on too
     many values.
     """
-    table, reading = widened(table, reading)
+    table, reading = widened(stacked_columns(table, reading), reading)
+    constant = constants(table, reading)
     chosen = choose(table.columns, reading)
     series, table, counts = _read(table, chosen, reading, limits)
     notices = list(table.notices)
     columns = _on_one_clock(series, notices)
     columns, first = _chosen_table(columns, table, reading)
+    size = next(iter(columns.values())).size
+    columns |= {channel: np.full(size, value) for channel, value in constant.items()}
     line_in_file = table.line_of
     line_of = None if line_in_file is None else lambda row: line_in_file(first + row)
     try:

@@ -17,6 +17,19 @@ from service.readers.unit_table import Conversion, conversion, is_unit, spelling
 _LETTERS = {"M": "torque_nm", "n": "speed_rpm", "p": "pressure_bar", "t": "time_s"}
 #: Names that are no words: LabVIEW's of its times, and a unit that stands for what is in it.
 _NAMES = {name: name for name in CHANNELS} | {"x_value": "time_s", "rpm": "speed_rpm"}
+#: Names of a time that are its unit, as historians title a column (`SECONDS`).
+_UNITS_AS_TITLES = {
+    "sec",
+    "secs",
+    "second",
+    "seconds",
+    "sekunden",
+    "msec",
+    "millisecond",
+    "milliseconds",
+    "millisekunden",
+}
+_NAMES |= dict.fromkeys(_UNITS_AS_TITLES, "time_s")
 #: Quantity -> the words that name it. One with a dash may also end a compound (Anpressdruck, 油压, Messzeit).
 _NOUNS = {
     "time_s": "time -zeit temps tiempo tempo tout -stamp ts timestamps -stempel date datum datetime fecha elapsed čas czas "
@@ -243,6 +256,7 @@ def column_of(text: str, unit: str | None = None, group: str = "", *, moments: b
         )
         raise InvalidError.of(message, code="title_too_long", value=shown)
     name, title_unit = _taken_apart(" ".join(title.translate(_WIDE).split()))
+    title_unit = name if title_unit is None and _key(name[:LONGEST_NAME]) in _UNITS_AS_TITLES else title_unit
     column = FileColumn(name, "s" if moments else title_unit, group, title)
     return column if unit is None or moments else with_unit(column, unit)
 
@@ -369,6 +383,8 @@ def understood(columns: Sequence[FileColumn], reading: Reading) -> tuple[list[Ta
         named.pop("time_s", None)
     by_map: dict[int, str] = {}
     for channel, choice in named.items():
+        if choice.is_constant():
+            continue
         try:
             if (index := _find(columns, channel, choice.column)) in by_map:
                 raise _wrong_map(choice.column, f"must not name one column for {by_map[index]} and {channel}")

@@ -16,13 +16,16 @@ from service.errors import MAX_QUOTED, InvalidError, Notice
 
 #: The time option that takes no clock: each row is a plateau.
 NO_TIME = "none"
+#: The titles of a channel whose values stand in the titles of columns, or in the names of sheets.
+COLUMNS, SHEETS = "=columns", "=sheets"
 #: The option of missing values by which every number is a measurement.
 NO_MISSING = "none"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ColumnChoice:
-    """The column of a channel: its title, and its unit; value = factor · converted + offset, in the channel's unit.
+    """The column of a channel: its title, or what stands for one (`constants`), and its unit; value = factor · converted +
+    offset, in the channel's unit.
 
     `unit` takes the place of what the file states, which must be that unit or `stated`; None: the file's own.
     """
@@ -32,6 +35,10 @@ class ColumnChoice:
     stated: str | None = None
     factor: float = 1.0
     offset: float = 0.0
+
+    def is_constant(self) -> bool:
+        """Whether it names no column but a value: `=5 bar`, or `=LABEL` of what stands above the table."""
+        return self.column.startswith("=") and self.column not in (COLUMNS, SHEETS)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

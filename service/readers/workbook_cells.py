@@ -66,7 +66,7 @@ def _part_of(archive: zipfile.ZipFile, sheet: str) -> str:
     """The part of an XLSX file that holds a sheet."""
     found: dict[str, str] = {}
 
-    class Names(_Elements):
+    class PartNames(_Elements):
         def begin(self, name: str, held: dict[str, str]) -> None:
             if name == "sheet":
                 found[held.get("name", "")] = held.get("id", "")
@@ -75,7 +75,7 @@ def _part_of(archive: zipfile.ZipFile, sheet: str) -> str:
 
     for part in ("xl/workbook.xml", "xl/_rels/workbook.xml.rels"):
         with archive.open(part) as file:
-            Names().parser.ParseFile(file)
+            PartNames().parser.ParseFile(file)
     target = found.get("id " + found.get(sheet, ""), "")
     return target.lstrip("/") if target.startswith("/") else normpath(join("xl", target))
 
@@ -97,7 +97,7 @@ def _worth_reading(archive: zipfile.ZipFile, part: str) -> Iterator[IO[bytes] | 
 def _xlsx(archive: zipfile.ZipFile, part: str) -> SheetCells:
     said = SheetCells()
 
-    class Cells(_Elements):
+    class SheetXml(_Elements):
         row, column, kind = -1, -1, ""
         inside = ""
         value, formula = "", ""
@@ -128,7 +128,7 @@ def _xlsx(archive: zipfile.ZipFile, part: str) -> SheetCells:
 
     with _worth_reading(archive, part) as file:
         if file is not None:
-            Cells().parser.ParseFile(file)
+            SheetXml().parser.ParseFile(file)
     return said
 
 
@@ -143,7 +143,7 @@ def _column(place: str) -> int:
 def _ods(archive: zipfile.ZipFile, sheet: str) -> SheetCells:
     said = SheetCells()
 
-    class Rows(_Elements):
+    class TableRows(_Elements):
         row, inside = 0, False
 
         def begin(self, name: str, held: dict[str, str]) -> None:
@@ -157,5 +157,5 @@ def _ods(archive: zipfile.ZipFile, sheet: str) -> SheetCells:
 
     with _worth_reading(archive, "content.xml") as file:
         if file is not None:
-            Rows().parser.ParseFile(file)
+            TableRows().parser.ParseFile(file)
     return said
