@@ -71,7 +71,7 @@ def plan_cleaning(record: Sampled) -> Cleaning:
     """The rows of a record to keep, with times in order and without spikes; channels are examined one by one.
 
     Raises UnusableRecordError on fewer than 16 samples, values beyond ±1e15, times that do not advance, a clock that falls
-    back, and samples that lie less than 1 µs or more than 10 s apart.
+    back, samples that lie less than 1 µs or more than 10 s apart, and rows that were stored only when a value changed.
     """
     size = record.time.size
     if size < criteria.FEWEST_SAMPLES:
@@ -148,13 +148,44 @@ def _in_order(time: FloatArray) -> tuple[NDArray[np.intp] | None, float, list[No
                 f"The sampling interval scatters by {scatter:.1%}. Times repeated: {repeated}, swapped: {swapped}."
             )
             notes.append(("clock_jitter", sentence))
+    missing, stored_on_change = _missing(time, period)
+    if stored_on_change:
+        raise UnusableRecordError(missing[0][1])
+    return order, period, notes + missing
+
+
+def missing_samples(time: FloatArray) -> list[Note]:
+    """The note of samples that are missing from an increasing clock [s], [n], of any kind of record: lost, not stored, or
+    passed over by a clock that was set forwards; no note where none are."""
+    steps = np.diff(time)
+    if steps.size == 0:
+        return []
+    # times that are rounded to a coarse unit lie one or two of it apart
+    return _missing(time, float(steps.mean(where=steps <= 2.5 * np.median(steps))))[0]
+
+
+def _missing(time: FloatArray, period: float) -> tuple[list[Note], bool]:
+    """The note of samples that are missing by their period [s], and whether they are so many in so many places that rows
+    were stored only when a value changed."""
+    steps = np.diff(time)
     lost = round((time[-1] - time[0]) / period) + 1 - time.size
     gaps = np.flatnonzero(steps > 1.5 * period)
-    if lost > 0 and gaps.size:
-        longest = int(gaps[steps[gaps].argmax()])
-        sentence = f"About {lost} samples ({lost / (lost + time.size):.2%}) are missing; the longest gap is"
-        notes.append(("samples_missing", f"{sentence} {steps[longest]:.4g} s at {time[longest]:.3f} s."))
-    return order, period, notes
+    if lost <= 0 or gaps.size == 0:
+        return [], False
+    longest = int(gaps[steps[gaps].argmax()])
+    share = lost / (lost + time.size)
+    at = f"{steps[longest]:.4g} s at {time[longest]:.3f} s"
+    sentence = f"About {lost} samples ({share:.2%}) are missing; the longest gap is {at}."
+    stored_on_change = share > criteria.SPARSE and gaps.size > criteria.SPARSE_GAPS * time.size
+    if stored_on_change:
+        sentence = (
+            f"Samples must be stored at an even rate, got {gaps.size} gaps among {time.size} rows, the longest of {at}: "
+            f"{share:.0%} are missing, as where a row is stored only when a value has changed. Export the record at an even "
+            f"rate, such as every {period:.3g} s, each value held until the next."
+        )
+    elif gaps.size == 1:
+        sentence = f"{sentence} A clock that was set forwards there looks the same."
+    return [("samples_missing", sentence)], stored_on_change
 
 
 def _spikes(channel: FloatArray, longest: int) -> NDArray[np.intp]:

@@ -77,10 +77,11 @@ def preview(
     from_profile = Named() if profile is None else named(profile, filename, shown["labels"])
     used = _by_titles(shown) if profile is None else profile
     if used is not None:
-        stated = {name: value for name in ("decimal", "missing") if (value := getattr(reading, name))}
+        stated = {name: value for name in ("decimal", "missing", "good") if (value := getattr(reading, name))}
         used = used.model_copy(update=stated)
         if reading.mapping and (titled := _by_titles(shown)):
-            used = used.model_copy(update={"columns": titled.columns})
+            of_file = [column for column in titled.columns if not column.title.startswith("=")]
+            used = used.model_copy(update={"columns": of_file + _stated_without_column(reading)})
     kind, cycles = kind or from_profile.kind, from_profile.cycles if cycles is None else cycles
     by_titles = profile is None and shown["problem"] is None  # as a push reads it; else with what is open left open
     read_by = reading_with(None if by_titles else used, reading if by_titles else Reading())
@@ -156,6 +157,15 @@ def _by_titles(shown: Mapping[str, Any]) -> RigProfile | None:
     return RigProfile.model_validate({"columns": list(columns.values())})
 
 
+def _stated_without_column(reading: Reading) -> list[RigColumn]:
+    """The channels of a map that no column holds, as columns of a profile."""
+    return [
+        RigColumn.model_validate({"title": choice.column, "channel": channel})
+        for channel, choice in reading.mapping.items()
+        if choice.column.startswith("=")
+    ]
+
+
 def _column(column: Mapping[str, Any], profile: RigProfile | None) -> PreviewColumn:
     title = _title(column)
     profile_column = next((item for item in profile.columns if item.title == title), None) if profile else None
@@ -181,7 +191,9 @@ def _saveable(
         "file_name": profile_fields.get("file_name") or pattern_for(filename, cycles),
         "kind": profile_fields.get("kind") or kind,
     }
-    columns = [profile_columns.get(title, RigColumn(title=title, channel=None)) for title in titles]
+    of_file = [title for title in titles if not title.startswith("=")]
+    columns = [profile_columns.get(title, RigColumn(title=title, channel=None)) for title in of_file]
+    columns += [column for title, column in profile_columns.items() if title.startswith("=")]
     fields = profile_fields | suggested | {"columns": columns}
     of_profile = {name: value for name, value in fields.items() if name in RigProfile.model_fields}
     return RigProfile.model_construct(**of_profile)  # not checked: no column need have a channel yet

@@ -145,6 +145,14 @@ FileMissing = Annotated[
         "out; `none`: all numbers are measurements",
     ),
 ]
+FileGood = Annotated[
+    str,
+    Field(
+        max_length=base.LONGEST_FILENAME,
+        description="The codes of a column of qualities that mark good rows, such as 0 or 192: others are left out; `none`: "
+        "all rows are read",
+    ),
+]
 FileSkipRows = Annotated[
     int, SHORT, Field(ge=0, le=base.MAX_SKIPPED, description="Number of lines above the table to skip")
 ]

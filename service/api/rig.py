@@ -22,7 +22,8 @@ class RigColumn(Schema):
     """One column of the rig's files: a channel, or a column to ignore."""
 
     title: Annotated[str, StringConstraints(min_length=1, max_length=base.LONGEST_TITLE)] = Field(
-        description="Its title in the file, without the unit; `group/title` in files with groups"
+        description="Its title in the file, without the unit; `group/title` in files with groups. Of a channel without a"
+        " column `=5 bar`, `=LABEL` of a cell above the table, `=columns` or `=sheets` (a value in their names)"
     )
     channel: ChannelName | None = Field(default=None, description="The channel; null: ignore the column")
     unit: Text | None = Field(default=None, description="Its unit; null: the unit in the file")
@@ -62,6 +63,11 @@ class RigProfile(Schema):
         default=None,
         description="Marks of missing values, such as `-9999,n/a`: rows with one, or with an empty cell, are left"
         " out; `none`: all numbers are measurements; null: a file with suspicious numbers is refused",
+    )
+    good: Text | None = Field(
+        default=None,
+        description="The codes of a column of qualities that mark good rows, such as `0` or `192`: other rows are left out;"
+        " `none`: all rows are read; null: a file with codes of unknown meaning is refused",
     )
     kind: FileKindName | None = Field(
         default=None, description="The kind of run; null: from `file_name` or from the request"

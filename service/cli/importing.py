@@ -6,7 +6,7 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
-from service.cli.options import EX_DATAERR, ChannelMap, Decimal, Missing, asking, fail, out, print_line
+from service.cli.options import EX_DATAERR, ChannelMap, Decimal, Good, Missing, asking, fail, out, print_line
 from service.cli.runs import run_line
 from service.client.clutchlife.transport import Service
 
@@ -30,6 +30,7 @@ def import_file(
     channel_map: ChannelMap = None,
     decimal: Decimal = None,
     missing: Missing = None,
+    good: Good = None,
     save: Annotated[
         str | None, typer.Option("--save", help="Save how the file is read as a rig profile of this name")
     ] = None,
@@ -39,7 +40,7 @@ def import_file(
 
     For the next file of the rig use `clutchlife push --rig NAME`, or import again.
     """
-    reading = {"map": channel_map, "decimal": decimal, "missing": missing}
+    reading = {"map": channel_map, "decimal": decimal, "missing": missing, "good": good}
     options: dict[str, Any] = {"kind": kind, "cycles": cycles, "rig": rig} | reading
     profile: dict[str, Any] | None = None
     while True:

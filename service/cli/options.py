@@ -76,6 +76,10 @@ Missing = Annotated[
         "none: every number is a measurement"
     ),
 ]
+Good = Annotated[
+    str | None,
+    typer.Option(help="Codes of a column of qualities that mark good rows, such as 0 or 192. none: all rows are read"),
+]
 
 Reason = Annotated[str, typer.Option("--reason", help="The reason, for the audit trail")]
 Json = Annotated[bool, typer.Option("--json", help="Print the service's answer as JSON")]

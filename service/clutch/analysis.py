@@ -15,6 +15,7 @@ from models.friction.identification import StribeckFit, StribeckFitStatus, fit_c
 from models.friction.speed_protocol import protocol_speeds
 from models.loops.lag_fit import StationaryCurve
 from models.loops.loops import FrictionLoop, evaluate_loops
+from models.records.cleaning import missing_samples
 from models.records.criteria import UNLOADED
 from models.records.plateaus import cut_plateaus
 from models.records.runs import Plateaus, curves_by_pressure, loaded
@@ -79,7 +80,9 @@ def analyse(run: IncomingRun, geometry: Geometry, torque_filter: float) -> Analy
     """
     if run.kind != "stationary_stribeck":
         engagement = evaluated(run, geometry)
-        return Analysis(engagement=engagement, warnings=tuple(engagement_notices(engagement)))
+        missing = missing_samples(run.channels["time_s"]) if "time_s" in run.channels else []
+        notices = [*engagement_notices(engagement), *(Notice(code=code, message=message) for code, message in missing)]
+        return Analysis(engagement=engagement, warnings=tuple(notices))
     if "time_s" not in run.channels:
         plateaus, notices = stationary_plateaus(run.channels), []
         if "torque_sd_nm" in run.channels and plateaus.torque_sd is None:

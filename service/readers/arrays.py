@@ -14,12 +14,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from models.arrays import FloatArray
 from service.errors import InvalidError, Notice
 from service.readers.column_names import column_of, known_channel, recognised
 from service.readers.limits import Limits
+from service.readers.numerals import Stamps, is_stamp
 from service.readers.stated_clocks import UNITS, stated_clock
-from service.readers.table import FileColumn, Reading, Table, index_of_wanted
-from service.readers.unit_table import is_unit
+from service.readers.table import Clock, FileColumn, Reading, Table, index_of_wanted
+from service.readers.unit_table import conversion, is_unit
 
 _DATA = ("data", "values", "value", "y", "samples")
 #: Factors that a file states beside raw counts; whether they were applied already only its program knows.
@@ -40,10 +42,11 @@ Tree = Mapping[str, Any]
 
 @dataclass(frozen=True, slots=True)
 class Leaf:
-    """An array that is read by slicing, and what is attached to it."""
+    """An array that is read by slicing, what is attached to it, and the array of its times where the file refers to one."""
 
     data: Any
     attributes: Mapping[str, Any] = field(default_factory=dict)
+    times: "Leaf | None" = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +63,7 @@ def table_of(tree: Tree, reading: Reading, limits: Limits, unread: tuple[str, ..
 
     Raises InvalidError where it holds no array that could be a channel.
     """
-    sources = list(_sources(_paired(tree), "", 0, {}))
+    sources = list(_sources(_paired(tree), "", 0, {}, Stamps({}, set())))
     groups = tuple(dict.fromkeys(source.column.group for source in sources))
     if reading.table:
         chosen = groups[index_of_wanted(groups, reading.table, "group")]
@@ -108,8 +111,8 @@ def _complete(sources: list[_Source]) -> list[str]:
     return [group for group, names in channels_by_group.items() if {"torque_nm", "speed_rpm", "pressure_bar"} <= names]
 
 
-def _sources(tree: Tree, group: str, depth: int, above: Tree) -> Iterator[_Source]:
-    """The columns of a folder and of those in it; `above` is what the folders above state."""
+def _sources(tree: Tree, group: str, depth: int, above: Tree, stamps: Stamps) -> Iterator[_Source]:
+    """The columns of a folder and of those in it; `above` is what the folders above state, `stamps` has the first start."""
     stated = {**above, **_scalars(tree), **{key: node for key, node in tree.items() if key.lower() in UNITS}}
     for name, node in tree.items():
         path = f"{group}/{name}" if group else name
@@ -122,14 +125,14 @@ def _sources(tree: Tree, group: str, depth: int, above: Tree) -> Iterator[_Sourc
                 label = next((_text(lowered[key]) for key in _LABELS if _text(lowered.get(key))), name)
                 data = replace(data, attributes={**node, **data.attributes})
                 for title, leaf in [*((key, node[key]) for key in remaining), (label, data)]:
-                    yield from _columns(title, leaf, path if remaining else group, {**stated, **node})
+                    yield from _columns(title, leaf, path if remaining else group, {**stated, **node}, stamps)
             elif depth < _DEEPEST:
-                yield from _sources(node, path, depth + 1, stated)
+                yield from _sources(node, path, depth + 1, stated, stamps)
         elif isinstance(node, Leaf):
-            yield from _columns(name, node, group, {**above, **tree})
+            yield from _columns(name, node, group, {**above, **tree}, stamps)
 
 
-def _columns(name: str, leaf: Leaf, group: str, beside: Tree) -> Iterator[_Source]:
+def _columns(name: str, leaf: Leaf, group: str, beside: Tree, stamps: Stamps) -> Iterator[_Source]:
     """The columns of one array: a vector, the fields of a compound one, or those of a matrix; none of any other.
 
     A list of texts that stands beside it, one for each column, gives their units if most of them are units, else names. A
@@ -152,7 +155,8 @@ def _columns(name: str, leaf: Leaf, group: str, beside: Tree) -> Iterator[_Sourc
     matrix = size > 1 and not dtype.names
     titles = [texts for texts in lists if matrix and texts is not units]
     names = max(titles, key=lambda own: recognised(own, ()), default=[])
-    clock = stated_clock({**_scalars(beside), **_scalars(leaf.attributes)}, lambda: rows)
+    clock = _referred(leaf, rows, stamps)
+    clock = clock or stated_clock({**_scalars(beside), **_scalars(leaf.attributes)}, lambda: rows, stamps)
     for at, (part, place) in enumerate(parts):
         title = names[at] if names else part
         stated_as = [title, f"field_{at}"] if dtype.names else [title]
@@ -162,6 +166,25 @@ def _columns(name: str, leaf: Leaf, group: str, beside: Tree) -> Iterator[_Sourc
         else:
             column = column_of(title, unit or None, group, moments=dtype.kind in "Mm")
         yield _Source(replace(column, rows=rows, clock=clock), leaf, place)
+
+
+def _referred(leaf: Leaf, rows: int, stamps: Stamps) -> Clock | None:
+    """The clock of an array that refers to an array of times, in a unit of time; one may state since when they count."""
+    times = leaf.times
+    unit = "" if times is None else unit_of_array(times.attributes)
+    converted = conversion("time_s", unit) if unit else None
+    if times is None or converted is None or _rows(times) != rows:
+        return None
+    _, _, since = unit.partition(" since ")
+    start = stamps.since_first([since.strip()]) if is_stamp(since) else None
+    shift = 0.0 if start is None else float(start[0] / np.timedelta64(1, "s"))
+
+    def read() -> FloatArray:
+        seconds = np.array(times.data[()], dtype=np.float64).reshape(-1)
+        converted.apply(seconds)
+        return seconds + shift
+
+    return Clock(times.data.name, read, own=True)
 
 
 def _unit(names: Sequence[str], attributes: Tree, beside: Tree, *, whole: bool) -> str:

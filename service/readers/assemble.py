@@ -22,15 +22,18 @@ from service.readers.column_names import (
     choose,
     is_counter,
     known_channel,
+    may_be_time,
     no_unit,
     part_of_second,
     several_times,
 )
+from service.readers.constants import constants, stacked_columns
 from service.readers.limits import Limits
 from service.readers.long_table import says_valid, valid_rows, widened
 from service.readers.missing_values import drop_totals, mask_stated_marks, refuse_stand_ins
 from service.readers.numerals import empty_cells, plain, read_cells
-from service.readers.table import NO_MISSING, NO_TIME, Clock, FileColumn, Reading, Table, index_of_wanted, labels, marks
+from service.readers.table import NO_TIME, Clock, FileColumn, Reading, Table, index_of_wanted, labels, marks
+from service.readers.unit_table import conversion
 
 #: The code of the notice that lists unused columns.
 LEFT_OUT = "columns_left_out"
@@ -81,20 +84,24 @@ def to_channels(table: Table, reading: Reading, limits: Limits) -> Channels:
     Raises InvalidError where a unit or a clock is not clear, a value is no number, or nothing is known; TooLargeError on too
     many values.
     """
-    table, reading = widened(table, reading)
+    table, reading = widened(stacked_columns(table, reading), reading)
+    constant = constants(table, reading)
     chosen = choose(table.columns, reading)
     series, table, counts = _read(table, chosen, reading, limits)
     notices = list(table.notices)
     columns = _on_one_clock(series, notices)
     columns, first = _chosen_table(columns, table, reading)
+    size = next(iter(columns.values())).size
+    columns |= {channel: np.full(size, value) for channel, value in constant.items()}
     line_in_file = table.line_of
     line_of = None if line_in_file is None else lambda row: line_in_file(first + row)
     try:
         check_columns(columns, line_of=line_of)
     except InvalidError as error:
-        if not error.errors or error.errors[0].value != "nan":
+        value = error.errors[0].value if error.errors and error.errors[0].code == "not_finite" else ""
+        if not value:
             raise
-        detail = f"{error.detail}: add missing=nan to leave such rows out"
+        detail = f"{error.detail}: add missing={value} to leave such rows out"
         raise InvalidError(detail, errors=error.errors, total=error.total) from None
     _refuse_standing(columns)
     return Channels(columns=columns, notices=tuple(notices), counts=counts, labels=labels(table.above))
@@ -133,11 +140,17 @@ def _chosen_table(columns: dict[str, FloatArray], table: Table, reading: Reading
 def _clocks(
     columns: Sequence[FileColumn], taken: Sequence[Taken], values: Mapping[int, FloatArray]
 ) -> dict[int, Clock | None]:
-    """The clock of each column that is taken and is no time: a column of times, its recorder's, or none."""
-    times = {column.index: _column_clock(columns, column, values) for column in taken if column.channel == "time_s"}
+    """The clock of each column that is taken and is no time: the one that the file states for it, a column of times, its
+    recorder's, or none."""
+    all_times = {column.index: _column_clock(columns, column, values) for column in taken if column.channel == "time_s"}
+    named = {at: column.index for column in taken for at in column.clock_of}
+    times = {at: clock for at, clock in all_times.items() if at not in named.values()} or all_times
     clocks: dict[int, Clock | None] = {}
     for index in (column.index for column in taken if column.channel != "time_s"):
         recorder = columns[index].clock
+        if index in named or (recorder is not None and recorder.own):
+            clocks[index] = all_times[named[index]] if index in named else recorder
+            continue
         of_group = [at for at in times if columns[at].group == columns[index].group]
         if of_group:
             chosen = max((at for at in of_group if at < index), default=of_group[0])
@@ -146,7 +159,9 @@ def _clocks(
             clocks[index] = finer or times[chosen]
         else:
             clocks[index] = recorder or (next(iter(times.values())) if len(times) == 1 else None)
-    for unused, following in zip_longest(times, [*times][1:]):
+    for unused, following in (
+        zip_longest(times, [*times][1:]) if not clocks or {*times.values()} & {*clocks.values()} else ()
+    ):
         if len(times) == 1 or times[unused] in clocks.values():
             continue
         if following is None or not _agree(values[unused], values[following]):
@@ -155,6 +170,18 @@ def _clocks(
         if np.unique(values[unused]).size > np.unique(values[following]).size:
             clocks = {at: times[unused] if clock is times[following] else clock for at, clock in clocks.items()}
     return clocks
+
+
+def _refuse_passed_over(column: FileColumn, seconds: FloatArray, clocks: Mapping[int, Clock | None]) -> None:
+    """Raise InvalidError where a column in a unit of time that names nothing runs like a clock that is used, and begins
+    within its record at another time: it may be that of a channel."""
+    for clock in clocks.values():
+        used = None if clock is None else clock.read()
+        if used is None or used.size != seconds.size or used.size < 2 or not _runs_on(seconds):
+            continue
+        shift = abs(float(seconds[0] - used[0]))
+        if _agree(seconds, used) and _step(used) / 2 < shift < float(np.ptp(used)):
+            raise several_times(f"those of the clock and {column.title or column.shown()}, {shift:g} s apart")
 
 
 def _column_clock(columns: Sequence[FileColumn], column: Taken, values: Mapping[int, FloatArray]) -> Clock:
@@ -199,19 +226,23 @@ def _read(
     if stated > limits.most_values:
         raise TooLargeError(f"a file must not hold more than {limits.most_values} values, got {stated}")
     channels = {column.index: column.channel for column in chosen}
-    says = [] if reading.missing == NO_MISSING else [i for i, own in enumerate(table.columns) if says_valid(own)]
+    says = [index for index, column in enumerate(table.columns) if says_valid(column, reading)]
     parts = {}
     if reading.time != NO_TIME and "time_s" in channels.values():
         unused = {at: own for at, own in enumerate(table.columns) if at not in indices}
         parts = {at: factor for at, own in unused.items() if (factor := part_of_second(own))}
-    read = read_cells(table, dict.fromkeys(says, "") | dict.fromkeys(parts, "time_s") | channels, reading)
+    timed = [at for at, own in enumerate(table.columns) if at not in indices and at not in parts and may_be_time(own)]
+    timed = timed if "time_s" in channels.values() and "time_s" not in choices_of(reading) else []
+    beside = dict.fromkeys(says, "") | dict.fromkeys([*parts, *timed], "time_s")
+    read = read_cells(table, beside | channels, reading)
+    read |= {index: mask_stated_marks(read[index], reading) for index in indices}
     read, table = drop_totals(read, [column.index for column in chosen if column.channel != "time_s"], table)
     for column in chosen:
-        read[column.index] = mask_stated_marks(read[column.index], reading)
         refuse_stand_ins(column.channel, read[column.index], table.line_of, reading)
     values: dict[int, FloatArray] = {}
     valid: dict[int, NDArray[np.bool_] | None] = {}
     dated = [read[column.index] for column in chosen if read[column.index].dtype.kind == "M"]
+    moments = {column.index for column in chosen if read[column.index].dtype.kind in "Mm"}
     start = min((moments[~np.isnat(moments)].min() for moments in dated if not np.isnat(moments).all()), default=None)
     notices = list(table.notices)
     for column in chosen:
@@ -225,9 +256,17 @@ def _read(
         notices.append(Notice(code="parts_of_seconds", message=message))
     chosen = [column for column in chosen if not column.guessed or _runs_on(values[column.index])]
     clocks = {} if reading.time == NO_TIME else _clocks(table.columns, chosen, values)
+    if len({clock.key in moments for clock in clocks.values() if clock is not None and clock.key in values}) > 1:
+        raise several_times("points in time and numbers")
+    other_times = {at: seconds for at, seconds in part_seconds.items() if at not in added and table.columns[at].unit}
+    for at in timed:
+        converted = conversion("time_s", table.columns[at].unit or "")
+        other_times |= {} if converted is None else {at: converted.factor * plain(read[at])}
+    for at, seconds in other_times.items() if "time_s" not in choices_of(reading) else ():
+        _refuse_passed_over(table.columns[at], seconds, clocks)
     used = {clock.key: clock for clock in clocks.values() if clock is not None}
     times = {key: clock.read() for key, clock in used.items()}
-    marked = [valid_rows(table.columns[index], read[index]) for index in says if index in read]
+    marked = [valid_rows(table.columns[index], read[index], reading) for index in says if index in read]
     series = {}
     for column in chosen:
         if column.channel != "time_s":

@@ -17,6 +17,19 @@ from service.readers.unit_table import Conversion, conversion, is_unit, spelling
 _LETTERS = {"M": "torque_nm", "n": "speed_rpm", "p": "pressure_bar", "t": "time_s"}
 #: Names that are no words: LabVIEW's of its times, and a unit that stands for what is in it.
 _NAMES = {name: name for name in CHANNELS} | {"x_value": "time_s", "rpm": "speed_rpm"}
+#: Names of a time that are its unit, as historians title a column (`SECONDS`).
+_UNITS_AS_TITLES = {
+    "sec",
+    "secs",
+    "second",
+    "seconds",
+    "sekunden",
+    "msec",
+    "millisecond",
+    "milliseconds",
+    "millisekunden",
+}
+_NAMES |= dict.fromkeys(_UNITS_AS_TITLES, "time_s")
 #: Quantity -> the words that name it. One with a dash may also end a compound (Anpressdruck, 油压, Messzeit).
 _NOUNS = {
     "time_s": "time -zeit temps tiempo tempo tout -stamp ts timestamps -stempel date datum datetime fecha elapsed čas czas "
@@ -87,7 +100,7 @@ class Taken:
 
     `unit`: the one that file or caller states; None: neither does, and the channel's own was taken. `guessed`: a time by its
     unit and a word in its name, which its values must bear out. `in_part`: words of its name are not known, and no other
-    column fits.
+    column fits. `clock_of`: the columns of which alone it is the time, as it names them (`t_M`).
     """
 
     channel: str
@@ -96,6 +109,7 @@ class Taken:
     unit: str | None
     guessed: bool = False
     in_part: bool = False
+    clock_of: frozenset[int] = frozenset()
 
 
 def _key(name: str) -> str:
@@ -188,9 +202,11 @@ def meaning(name: str, unit: str | None = None) -> tuple[str | None, Sense]:
     return (channel, Sense.PART) if _measures(quantity, unit) else (None, Sense.UNKNOWN)
 
 
-def _words(name: str) -> list[str]:
-    """The words of a name in small letters, without labels that end in a number."""
+def _words(name: str, *, digits: bool = False) -> list[str]:
+    """The words of a name in small letters, without labels that end in a number; or with them (`digits`)."""
     key = _key(re.sub(r"(?<=[a-zäöüß])(?=[A-Z])", " ", name))
+    if digits:
+        return re.findall(r"[^\W_]+", key)
     key = re.sub(r"(?<![^\W_])(?:ch|ai|cnt|kanal|max_?|[a-z])?\d+(?![^\W_])", " ", key)
     return re.findall(r"[^\W\d_]+", key)
 
@@ -212,7 +228,7 @@ def _is_another(name: str) -> bool:
 
 def is_time(column: FileColumn) -> bool:
     """Whether a column is a time by its name, or may be one by its unit."""
-    return meaning(column.name, column.unit)[0] == "time_s" or _may_be_time(column)
+    return meaning(column.name, column.unit)[0] == "time_s" or may_be_time(column)
 
 
 def part_of_second(column: FileColumn) -> float | None:
@@ -240,6 +256,7 @@ def column_of(text: str, unit: str | None = None, group: str = "", *, moments: b
         )
         raise InvalidError.of(message, code="title_too_long", value=shown)
     name, title_unit = _taken_apart(" ".join(title.translate(_WIDE).split()))
+    title_unit = name if title_unit is None and _key(name[:LONGEST_NAME]) in _UNITS_AS_TITLES else title_unit
     column = FileColumn(name, "s" if moments else title_unit, group, title)
     return column if unit is None or moments else with_unit(column, unit)
 
@@ -366,6 +383,8 @@ def understood(columns: Sequence[FileColumn], reading: Reading) -> tuple[list[Ta
         named.pop("time_s", None)
     by_map: dict[int, str] = {}
     for channel, choice in named.items():
+        if choice.is_constant():
+            continue
         try:
             if (index := _find(columns, channel, choice.column)) in by_map:
                 raise _wrong_map(choice.column, f"must not name one column for {by_map[index]} and {channel}")
@@ -375,6 +394,7 @@ def understood(columns: Sequence[FileColumn], reading: Reading) -> tuple[list[Ta
     free = [] if reading.only_named else [index for index in range(len(columns)) if index not in by_map]
     senses = {index: meaning(columns[index].name, columns[index].unit) for index in free}
     chosen = dict(by_map)
+    clocks_of = {} if reading.time == NO_TIME else _clocks_by_name(columns)
     guessed: set[int] = set()
     in_part: set[int] = set()
     for channel in CHANNELS:
@@ -395,6 +415,9 @@ def understood(columns: Sequence[FileColumn], reading: Reading) -> tuple[list[Ta
             in_part |= set() if whole else {*candidates}
         elif candidates and (whole or channel in _MEASURED):
             errors.append(_twice(channel, *(columns[index] for index in candidates + rivals)))
+    for at, of in clocks_of.items():
+        if at not in chosen and of & chosen.keys():
+            chosen[at] = "time_s"
     if not {*chosen} - guessed:
         return [], errors
     columns_taken: list[Taken] = []
@@ -412,13 +435,40 @@ def understood(columns: Sequence[FileColumn], reading: Reading) -> tuple[list[Ta
         else:
             unstated += [(channel, columns[index])] if unit is None and asked_column is None and not public else []
         unit = CHANNELS[channel].unit if unit is None and public else unit
-        columns_taken.append(Taken(channel, index, converted, unit, index in guessed, index in in_part))
+        clock_of = frozenset() if index in by_map or channel != "time_s" else clocks_of.get(index, frozenset())
+        columns_taken.append(Taken(channel, index, converted, unit, index in guessed, index in in_part, clock_of))
     if any(channel != "time_s" for channel, _ in unstated):
         errors.append(no_unit(unstated, reading))
     return columns_taken, errors
 
 
-def _may_be_time(column: FileColumn) -> bool:
+def _clocks_by_name(columns: Sequence[FileColumn]) -> dict[int, frozenset[int]]:
+    """The columns of times that name other columns, and the ones that they name: `t_M` M, `Zeit Moment` the torque's."""
+    found: dict[int, frozenset[int]] = {}
+    for at, column in enumerate(columns):
+        words = _words(column.name[:LONGEST_NAME], digits=True)
+        rest = [word for word in words if _QUANTITIES.get(word) != "time_s" and word != "t"]
+        if not 0 < len(rest) < len(words) or (column.unit is not None and not _measures("time_s", column.unit)):
+            continue
+        key, channel = "_".join(rest), meaning(" ".join(rest))
+        if channel[0] is None and key in _SYMBOLS and len(_SYMBOLS[key]) == 1:
+            channel = _SYMBOLS[key][0], Sense.WHOLE
+        of = {
+            other
+            for other, own in enumerate(columns)
+            if other != at
+            and own.group == column.group
+            and (
+                "_".join(_words(own.name[:LONGEST_NAME], digits=True)) == key
+                or meaning(own.name, own.unit) == channel != (None, Sense.UNKNOWN)
+            )
+        }
+        if of:
+            found[at] = frozenset(of)
+    return found
+
+
+def may_be_time(column: FileColumn) -> bool:
     """Whether a column that is in a unit of time may be the clock, if its values run on as one."""
     return meaning(column.name, column.unit)[1] is Sense.UNKNOWN and _measures("time_s", column.unit)
 

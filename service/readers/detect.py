@@ -1,7 +1,9 @@
 """The format of a file, by its first bytes and its suffix; and its bytes, unpacked where it is packed with gzip or one of
 those in a ZIP archive, no further than the limits allow."""
 
+import codecs
 import gzip
+import re
 import tempfile
 import zipfile
 import zlib
@@ -77,14 +79,36 @@ _FOREIGN = {
     b"IGOR": "an Igor Pro text file (Igor saves waves as delimited text with their names)",
     b"CPYA": "an Origin project (Origin exports a worksheet as CSV or XLSX)",
     b"\x93NUMPY": "an array of NumPy, which has no titles (numpy.savetxt with header= writes them)",
+    b"MULTI_STREAM_FIL": "a Dewesoft file (Dewesoft exports CSV, MATLAB, MDF4 and TDMS files)",
+    b"FORMAT\0": "an MTS RPC file (RPC Pro and nCode save it as CSV or MATLAB file)",
+    b"\x94\x13": "an HBM catman file (catman exports CSV, MATLAB, MDF4 and TDMS files)",
+    b"\x91\x13": "an HBM catman file (catman exports CSV, MATLAB, MDF4 and TDMS files)",
+    b"CDF\x01": "a NetCDF 3 file (`nccopy -k nc4` makes HDF5 of it, `ncdump` text)",
+    b"CDF\x02": "a NetCDF 3 file (`nccopy -k nc4` makes HDF5 of it, `ncdump` text)",
+    b"CDF\x05": "a NetCDF 3 file (`nccopy -k nc4` makes HDF5 of it, `ncdump` text)",
+    b"<h": "an AiM file (RaceStudio exports CSV files)",
+    b"LOGG": "a Vector BLF log (CANoe and CANape convert it with its database to MDF4 or CSV)",
+    b"RIFF": "a RIFF file, as sound is kept in (save the channels as CSV or MATLAB file)",
+    b":WFM#": "a Tektronix waveform (the oscilloscope saves CSV files too)",
+    b"AG10": "a Keysight waveform (the oscilloscope saves CSV and HDF5 files too)",
     b"ARROW1": "an Arrow file (pyarrow, polars and pandas write Parquet as well)",
     b"[{": "JSON: send it to POST /v1/clutches/ID/runs",
     b"{": "JSON: send it to POST /v1/clutches/ID/runs",
 }
+#: Beginnings that a text may have too.
+_AMBIGUOUS = {b"BM", b"<h", b"LOGG", b"RIFF"}
 #: Suffixes of what is never a record; files in an archive are often accompanied by such.
 _NO_RECORDS = (
     ".pdf", ".png", ".jpg", ".jpeg", ".docx", ".doc", ".md", ".html", ".xml", ".json", ".zip", ".exe", ".py", ".m",
 )  # fmt: skip
+#: Suffixes of files that only the programs of their makers read, and what these export.
+_PROGRAMS = {
+    ".d7d": "Dewesoft", ".dxd": "Dewesoft", ".d7z": "Dewesoft", ".rsp": "RPC Pro", ".rpc": "RPC Pro", ".xrk": "RaceStudio",
+    ".xrz": "RaceStudio", ".drk": "RaceStudio", ".ld": "MoTeC i2", ".blf": "CANoe", ".wdf": "Xviewer", ".sie": "InField",
+    ".mem": "Hioki's viewer", ".gbd": "Graphtec's viewer", ".trc": "the oscilloscope", ".wfm": "the oscilloscope",
+}  # fmt: skip
+#: Bytes that no text has, in any encoding that is read.
+BINARY = re.compile(rb"[\x01-\x08\x0e-\x1a\x1c-\x1f]")
 _BLOCK = 1 << 20
 _MAX_MEMBERS = 10_000
 #: What zipfile raises on an archive that is damaged or encrypted, or packed in a way that it does not know.
@@ -147,13 +171,30 @@ def sniff(path: Path, filename: str, limits: Limits) -> Format:
     if suffix == ".mat" and head[:2] in (b"\0\0", b"\n\0", b"\x14\0", b"\x1e\0"):
         return Format.MATLAB  # of version 4, which has no magic number
     for magic, foreign in _FOREIGN.items():
-        if head.startswith(magic) and not (magic == b"BM" and head.isascii()):
+        if head.startswith(magic) and (b"\0" in head or not head.isascii() or magic not in _AMBIGUOUS):
             raise InvalidError(f"{shown} must be {FORMATS}, got {foreign}")
     if by_suffix := _SUFFIXES.get(suffix):
         raise InvalidError(
             f"{shown} is not a {by_suffix} file, although its name says so: correct the name, or export the file again"
         )
+    if b"\0" in head and utf_16(head) is None and BINARY.search(head):
+        program = _PROGRAMS.get(suffix, "the program that wrote it")
+        raise InvalidError(
+            f"{shown} must be {FORMATS}, got binary data of a format that is not read here: in {program}, export the "
+            "channels as one of these"
+        )
     return Format.TEXT
+
+
+def utf_16(head: bytes) -> str | None:
+    """The encoding of a text of two bytes a letter, by its byte order mark or the zeros in its first letters."""
+    if head.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return "utf-16"
+    even, odd = head[:512:2], head[1:512:2]
+    for name, zeros, letters in (("utf-16-le", odd, even), ("utf-16-be", even, odd)):
+        if odd and zeros.count(0) > 0.9 * len(odd) and letters.count(0) == 0:
+            return name
+    return None
 
 
 def _format_of_archive(path: Path) -> Format:

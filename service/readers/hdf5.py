@@ -47,4 +47,16 @@ def _leaf(node: h5py.Dataset) -> Any:
             item.decode("utf-8", "replace") if isinstance(item, bytes) else item
             for item in np.asarray(node).reshape(-1)
         ]
-    return Leaf(node, attributes)
+    return Leaf(node, attributes, _times(node))
+
+
+def _times(node: h5py.Dataset) -> Leaf | None:
+    """The array that a data set refers to for its first dimension: a dimension scale, or as NetCDF's conventions name it.
+
+    Source: HDF5 Dimension Scale Specification; CF Conventions, 5, coordinate systems.
+    """
+    scales = list(node.dims[0].values()) if node.ndim and not node.is_scale else []
+    words = node.attrs.get("coordinates", "")
+    named = words.split() if isinstance(words, str) else []
+    scales += [held for name in named[:_DEEPEST] if isinstance(held := node.parent.get(name), h5py.Dataset)]
+    return next((Leaf(scale, dict(scale.attrs.items())) for scale in scales if scale.shape == node.shape), None)

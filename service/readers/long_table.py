@@ -5,6 +5,7 @@ a measured channel's.
 """
 
 import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -24,36 +25,81 @@ from service.readers.column_names import (
     several_times,
 )
 from service.readers.limits import LIMITS
-from service.readers.numerals import plain, read_cells
-from service.readers.table import NO_TIME, Clock, FileColumn, Reading, Table
+from service.readers.numerals import NUMBER, plain, read_cells
+from service.readers.table import NO_MISSING, NO_TIME, Clock, FileColumn, Reading, Table, marks
 from service.readers.table_finder import is_value
 from service.readers.unit_table import is_unit
 
 #: Rows of a table without lines by which its columns are judged, as many as others show.
 _MAX_LOOKED_AT = 20
 _VALUES = re.compile(r"val(?!id)|wert|reading|messung|数值|値|^y$", re.IGNORECASE)
-#: A column that says which values are valid, and what it says of those that are: in words, by OPC's code, as a flag, which
-#: of a status may also be that of an error.
+#: A column that says which values are valid, of one whose title says what its flag means; and words for good and bad ones.
 _QUALITY, _STATUS = (re.compile(names, re.IGNORECASE) for names in ("valid|qualit|gültig", "status|zustand"))
-_GOOD = {"good", "ok", "valid", "192", "192.0", "gut", "gültig", "i.o.", "io", "pass", "passed"}
-_BAD = {"bad", "nok", "invalid", "schlecht", "ungültig", "n.i.o.", "nio"} | {
+_VALID, _INVALID = (re.compile(names, re.IGNORECASE) for names in ("valid|gültig", "invalid|ungültig"))
+_GOOD = {"good", "ok", "valid", "gut", "gültig", "i.o.", "io", "pass", "passed"}
+_BAD = {"bad", "nok", "invalid", "schlecht", "ungültig", "n.i.o.", "nio", "uncertain"} | {
     "fail", "failed", "fault", "error", "fehler", "alarm"
 }  # fmt: skip
-_ON, _OFF = {"true", "1", "1.0"}, {"false", "0", "0.0"}
+_FLAGS = {"true": 1.0, "false": 0.0}
+#: OPC's codes. Source: OPC DA 3.0, 6.8 (of a byte, the two highest bits: 192 good, 64 uncertain, 0 bad); OPC UA part 4,
+#: 7.39 (of four bytes, the two highest bits: 0 good, 0x40000000 uncertain, 0x80000000 bad).
+_DA_GOOD, _DA_MOST, _UA_OTHER = 192, 255, 2**30
+#: Distinct values that a column of codes has at most. Chosen: codes of one recorder; a quality in percent has more.
+_MOST_CODES = 6
 _SECOND = np.timedelta64(1, "s")
 
 
-def says_valid(column: FileColumn) -> bool:
-    """Whether a column says which rows are valid, by its title."""
+def says_valid(column: FileColumn, reading: Reading) -> bool:
+    """Whether a column says which rows are valid, by its title, and is to be looked at."""
+    if reading.good == NO_MISSING or reading.missing == NO_MISSING:
+        return False
     return _QUALITY.search(column.name) is not None or _STATUS.search(column.name) is not None
 
 
-def valid_rows(column: FileColumn, cells: NDArray[Any]) -> NDArray[np.bool_] | None:
-    """Which rows a column says to be valid [n]; None where it does not say so in words or flags that are known."""
-    words = np.array([word.casefold() for word in _stripped(cells)], dtype=object)
-    flags = _ON | _OFF if _QUALITY.search(column.name) else set()
-    good = _GOOD | (flags & (_OFF if re.search("invalid|ungültig", column.name, re.IGNORECASE) else _ON))
-    return np.isin(words, list(good)) if set(words) <= good | _BAD | flags else None
+def valid_rows(column: FileColumn, cells: NDArray[Any], reading: Reading) -> NDArray[np.bool_] | None:
+    """Which rows a column says to be valid [n]: by the caller's codes, in words, by OPC's codes, or by a flag whose title
+    says what it means; None where all rows have one value, or the column holds none of these.
+
+    Raises InvalidError where rows have different codes of a quality, of which nobody says which is good.
+    """
+    codes = np.array([_code(word) for word in _stripped(cells)], dtype=object)
+    values = set(codes)
+    numbers = {value for value in values if isinstance(value, float)}
+    good: set[str | float]
+    if reading.good:
+        good = {"" if word == "empty" else _code(word) for word in marks(reading.good)}
+    elif values <= _GOOD | _BAD:
+        good = {*_GOOD}
+    elif _VALID.search(column.name) and numbers == values and numbers <= {0.0, 1.0}:
+        good = {0.0 if _INVALID.search(column.name) else 1.0}
+    elif len(values) < 2 or len(values) > _MOST_CODES or not _QUALITY.search(column.name):
+        return None
+    elif numbers == values and _DA_GOOD in numbers and max(numbers) <= _DA_MOST:
+        good = {number for number in values if number in numbers and float(number) >= _DA_GOOD}
+    elif numbers == values and 0.0 in numbers and min(numbers - {0.0}) >= _UA_OTHER:
+        good = {0.0}
+    else:
+        raise _which_is_good(column, codes)
+    return np.array([code in good for code in codes.tolist()])
+
+
+def _code(word: str) -> str | float:
+    """A code as a number where it is one, or a flag."""
+    word = word.casefold()
+    return float(word) if NUMBER.fullmatch(word) else _FLAGS.get(word, word)
+
+
+def _which_is_good(column: FileColumn, codes: NDArray[Any]) -> InvalidError:
+    counts = {
+        f"{code:g}" if isinstance(code, float) else code or "empty": count for code, count in Counter(codes).items()
+    }
+    shown = ", ".join(f"{code} in {count} rows" for code, count in counts.items())
+    first, *_ = counts
+    message = (
+        f"column {column.shown()} holds {shown}: which of them is good? Add good={first}, or whichever it is, to leave the "
+        f"other rows out; good={NO_MISSING} reads all rows"
+    )
+    return InvalidError.of(message, code="which_is_good", pointer="/good", value=column.shown())
 
 
 def widened(table: Table, reading: Reading) -> tuple[Table, Reading]:
@@ -76,14 +122,14 @@ def widened(table: Table, reading: Reading) -> tuple[Table, Reading]:
     timed = _time(columns, reading)
     numeric = [index for index, cells in head.items() if cells and all(map(is_value, cells))]
     value = _value(columns, numeric, best, reading)
-    marked = next((index for index, column in enumerate(columns) if says_valid(column)), None)
+    marked = next((index for index, column in enumerate(columns) if says_valid(column, reading)), None)
     index_titles = {index: "" for index in (best, unit, marked) if index is not None} | {value: columns[value].shown()}
     cells = read_cells(table, index_titles | ({} if timed is None else {timed[0]: "time_s"}), reading)
     names = _stripped(cells[best])
     units = np.full(names.size, "", dtype=object) if unit is None else _stripped(cells[unit])
     if marked is not None:
-        good = valid_rows(columns[marked], cells[marked])
-        good = cells[marked] == cells[marked][0] if good is None else good
+        good = valid_rows(columns[marked], cells[marked], reading)
+        good = np.ones(names.size, dtype=np.bool_) if good is None else good
         cells[value] = np.ma.MaskedArray(cells[value], mask=np.ma.getmaskarray(cells[value]) | ~good)
     times = None if timed is None else _seconds(cells[timed[0]], timed[1])
     rows = {name: np.flatnonzero(names == name) for name in dict.fromkeys(names.tolist()) if name}

@@ -205,9 +205,13 @@ def _totals(columns: list[FloatArray]) -> list[str]:
 
 
 def _chance(above: list[FloatArray], row: list[float], name: str) -> float:
-    """How probable it is that a measured row is by chance a statistic of all columns above it; infinite where it is not."""
+    """How probable it is that a measured row is by chance a statistic of all columns above it, of the finite values in them;
+    infinite where it is not."""
     chance = 1.0
-    for column, value in zip(above, row, strict=True):
+    for held, value in zip(above, row, strict=True):
+        column = held[np.isfinite(held)]
+        if column.size < 2 or not np.isfinite(value):
+            return np.inf
         total, spread = _STATISTICS[name](column), float(np.ptp(column))
         written = min(map(_half_a_digit, column[:_MAX_LOOKED_AT].tolist()))
         rounded = 0.0 if name in _EXACT else _half_a_digit(value) + written * (column.size if name == "sums" else 1)

@@ -218,7 +218,10 @@ def _remedy(shown: str) -> str:
     """What helps where a cell is empty, or holds a word or a sign that may stand for no value."""
     if not shown:
         return ": fill the cell, or add missing=empty to leave out such rows"
-    return "" if any(map(str.isdigit, shown)) or "," in shown else f": add missing={shown} to leave out such rows"
+    if shown.startswith("="):
+        return ": no program has computed this formula. Open the workbook in Excel or LibreOffice, and save it"
+    number = any(map(str.isdigit, shown)) and "#" not in shown  # `1.#QNAN` is none
+    return "" if number or "," in shown else f": add missing={shown} to leave out such rows"
 
 
 def empty_cells(name: str, rows: Sequence[int], line_of: LineOf | None, last: int) -> InvalidError:

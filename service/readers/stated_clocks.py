@@ -10,6 +10,7 @@ import numpy as np
 
 from models.arrays import FloatArray
 from service.errors import MAX_QUOTED, InvalidError
+from service.readers.numerals import Stamps, is_stamp
 from service.readers.table import Clock
 from service.readers.unit_table import conversion, spellings
 
@@ -38,17 +39,25 @@ _DECIMATION = re.compile(
 )
 _COUNTS = "(?:number_of_|no\\._of_|num_)?(?:samples|points)|(?:anzahl_)?(?:messwerte|messpunkte)"
 _DURATIONS = r"(?:\w+_)?(?:duration|dauer|durée|duración|durata)|messzeit|(?:test|recording|measurement)_time"
-_STARTS = "t0|x0|wf_start_offset|start_value|hoffset"
+_STARTS = (
+    r"t0|x0|wf_start_offset|start_value|hoffset|start(?:ing)?(?:_?time)?|t_?start|(?:start|time|t)_?offset|(?:trigger_?)?delay"
+    r"|begin(?:ning)?|origin_?time|startzeit|zeitversatz|offset(?=_(?:s|sec|ms|us|µs)$)"
+)
 #: Names of a unit, beside a value or as an end of its name.
 UNITS = ("unit", "units", "unit_string", "ni_unitdescription", "yunit", "einheit")
 #: The units of the abscissa, where they stand by themselves.
 _X_UNITS = ("hunit", "x_unit", "xunit", "wf_xunit_string")
+_SECOND = np.timedelta64(1, "s")
 _HERTZ = dict.fromkeys(["", "hz", "1/s", "s-1", "s/s", "sps", "samples/s"], 1.0) | {"khz": 1e3, "ks/s": 1e3, "mhz": 1e6}
-_VALUE = re.compile(r"\s*(\d+(?:[.,]\d*)?(?:[eE][+-]?\d+)?)\s*(\D*)")
+_VALUE = re.compile(r"\s*([+-]?\d+(?:[.,]\d*)?(?:[eE][+-]?\d+)?)\s*(\D*)")
 
 
-def stated_clock(held: Mapping[str, float | str], rows: Callable[[], int], counted: str = "") -> Clock | None:
+def stated_clock(
+    held: Mapping[str, float | str], rows: Callable[[], int], stamps: Stamps, counted: str = ""
+) -> Clock | None:
     """The clock among names and what they hold: start + k · step [s] for each of the rows; None where none is stated.
+
+    A start that is a point in time counts from the first one of the file, which `stamps` knows.
 
     Of several rates that of what was stored is meant. Reading the clock raises InvalidError where rates differ otherwise, or
     something else says that not every sample is a row: `counted` (how a column counts samples), a decimation, a duration.
@@ -59,7 +68,7 @@ def stated_clock(held: Mapping[str, float | str], rows: Callable[[], int], count
     if not steps + rates or not (steps + rates)[0][0] > 0:
         return None
     other_clocks = [one for one in _stated(named, _ANY_RATE) if one[1].lower() not in ("", "s-1")]
-    first, ways = starts[0] if starts else (0.0, "", ""), [*steps, *rates, *other_clocks]
+    first, ways = starts[0] if starts else (_moment(named, stamps), "", ""), [*steps, *rates, *other_clocks]
 
     def read() -> FloatArray:
         seconds = {one[2]: in_seconds(*one, rate=one not in steps) for one in ways if one[0] > 0}
@@ -79,6 +88,13 @@ def stated_clock(held: Mapping[str, float | str], rows: Callable[[], int], count
 
     counts = bool(steps) and steps[0][:2] in ((1.0, ""), (1.0, "s")) and first[0] == 0
     return Clock((first, *ways, counted), read, counts=counts)
+
+
+def _moment(named: Mapping[str, float | str], stamps: Stamps) -> float:
+    """The point in time at which the samples begin, in s after the first one of the file; 0 where none is stated."""
+    texts = [value.strip() for key, value in named.items() if isinstance(value, str) and re.fullmatch(_STARTS, key)]
+    since = [stamps.since_first([text]) for text in texts if is_stamp(text)]
+    return next((float(moment[0] / _SECOND) for moment in since if moment is not None), 0.0)
 
 
 def _is_decimation(key: str, value: float | str) -> bool:

@@ -16,13 +16,16 @@ from service.errors import MAX_QUOTED, InvalidError, Notice
 
 #: The time option that takes no clock: each row is a plateau.
 NO_TIME = "none"
+#: The titles of a channel whose values stand in the titles of columns, or in the names of sheets.
+COLUMNS, SHEETS = "=columns", "=sheets"
 #: The option of missing values by which every number is a measurement.
 NO_MISSING = "none"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ColumnChoice:
-    """The column of a channel: its title, and its unit; value = factor · converted + offset, in the channel's unit.
+    """The column of a channel: its title, or what stands for one (`constants`), and its unit; value = factor · converted +
+    offset, in the channel's unit.
 
     `unit` takes the place of what the file states, which must be that unit or `stated`; None: the file's own.
     """
@@ -33,6 +36,10 @@ class ColumnChoice:
     factor: float = 1.0
     offset: float = 0.0
 
+    def is_constant(self) -> bool:
+        """Whether it names no column but a value: `=5 bar`, or `=LABEL` of what stands above the table."""
+        return self.column.startswith("=") and self.column not in (COLUMNS, SHEETS)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reading:
@@ -41,7 +48,8 @@ class Reading:
     `mapping`: channel -> its column; `only_named`: no other column is taken. `table`: the sheet, group or archived file.
     `time`: the title of the time column, or NO_TIME. `decimal`: the decimal sign, "." or ",". `skip_rows`: lines above that
     are not looked at. `missing`: marks of values that are missing, such as `-9999,n/a`; where any is given, rows without a
-    value are left out; NO_MISSING: every number is a measurement.
+    value are left out; NO_MISSING: every number is a measurement. `good`: codes of a column of qualities that mark good
+    rows, such as `0` or `192`; NO_MISSING: all rows are read.
     """
 
     mapping: Mapping[str, ColumnChoice] = field(default_factory=dict)
@@ -51,18 +59,21 @@ class Reading:
     decimal: str = ""
     skip_rows: int = 0
     missing: str = ""
+    good: str = ""
 
 
 @dataclass(frozen=True, slots=True)
 class Clock:
     """The times of a column by the recorder's own clock. Columns whose `key` is equal share it; `read` gives [n] s.
 
-    `counts`: the clock may be a default that only counts samples, a second each.
+    `counts`: the clock may be a default that only counts samples, a second each. `own`: the file states it for this column,
+    whatever columns of times stand beside it.
     """
 
     key: object
     read: Callable[[], FloatArray]
     counts: bool = False
+    own: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,7 +14,7 @@ from typing import Any
 from service.errors import MAX_QUOTED, InvalidError, Notice
 from service.readers.column_names import bare_unit, column_of, is_counter, known_channel, recognised, with_unit
 from service.readers.limits import LONGEST_TITLE, LONGEST_UNIT
-from service.readers.numerals import NUMBER, is_stamp, with_unit_apart
+from service.readers.numerals import NUMBER, Stamps, is_stamp, with_unit_apart
 from service.readers.stated_clocks import stated_clock
 from service.readers.table import FileColumn, Table, labels
 from service.readers.unit_table import conversion, is_unit
@@ -145,14 +145,14 @@ def table_in(data: DataRows, *, first_line: int, rows_read: Callable[[], int], *
     refuse_factors(above)
     head = [shown(row) for row in rows[layout.start : layout.start + _MAX_SHOWN]]
     columns = list(layout.columns())
-    counted = _counted(columns, head)
+    counted, stamps = _counted(columns, head), Stamps({}, set())
     for place, column in enumerate(columns):
         if is_counter(column) and shown(data.first_row)[place : place + 1] == ("",):
             columns[place] = FileColumn("", title=column.title)
             continue
         own_rows = [row for row in above if len(row) > place and row[place]]
         labelled = [(row[0], row[place]) if place and row in own_rows else row for row in above]
-        clock = stated_clock(labels([*labelled, *((row[place],) for row in own_rows)]), rows_read, counted)
+        clock = stated_clock(labels([*labelled, *((row[place],) for row in own_rows)]), rows_read, stamps, counted)
         columns[place] = replace(column, clock=clock)
     return Table(
         columns=tuple(columns),
@@ -234,8 +234,10 @@ def is_blank(row: Row) -> bool:
 
 
 def is_value(cell: Any) -> bool:
-    """Whether a cell is a number or a point in time."""
+    """Whether a cell is a number or a point in time, or a formula for one that no program has computed."""
     if isinstance(cell, str):
+        if cell[:1] == "=" != cell:
+            return True
         return bool(cell) and (NUMERIC.fullmatch(cell) is not None or is_stamp(cell) or bool(with_unit_apart(cell)[1]))
     return cell is not None and not isinstance(cell, bool)
 

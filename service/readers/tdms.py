@@ -18,7 +18,7 @@ from service.errors import MAX_QUOTED, InvalidError
 from service.readers.arrays import refuse_counts, unit_of_array
 from service.readers.column_names import column_of
 from service.readers.limits import Limits
-from service.readers.numerals import is_stamp
+from service.readers.numerals import Stamps, is_stamp
 from service.readers.stated_clocks import evenly, in_seconds, stated_clock
 from service.readers.table import Clock, FileColumn, Reading, Table, cut_short
 from service.readers.unit_table import conversion
@@ -42,9 +42,12 @@ def read_table(path: Path, reading: Reading, limits: Limits) -> Table:
     group_properties = {group.name: _stated({**file.properties, **group.properties}) for group in groups}
     starts = [channel.properties.get("wf_start_time") for channel in channels]
     earliest = min((start for start in starts if start is not None), default=None)
+    stamps = Stamps({}, set())
     clocks = [
         _waveform(channel, earliest)
-        or stated_clock(group_properties[channel.group_name] | _stated(channel.properties), partial(len, channel))
+        or stated_clock(
+            group_properties[channel.group_name] | _stated(channel.properties), partial(len, channel), stamps
+        )
         for channel in channels
     ]
 

@@ -10,23 +10,34 @@ import io
 import re
 import time
 from bisect import bisect_right
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pydantic_core
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
-from service.errors import MAX_ERRORS, MAX_QUOTED, FieldError, InvalidError, TooLargeError
+from service.errors import MAX_ERRORS, MAX_QUOTED, FieldError, InvalidError, Notice, TooLargeError
 from service.readers.column_names import named_columns, recognised
-from service.readers.detect import ByteSource, Format, overdue, too_slow
+from service.readers.detect import BINARY, ByteSource, Format, overdue, too_slow, utf_16
 from service.readers.limits import LIMITS, LONGEST_LINE_BYTES, Limits
 from service.readers.numerals import Numerals, is_stamp
 from service.readers.table import Reading, Table
-from service.readers.table_finder import MAX_ROWS, TURNED, DataRows, Layout, find_table, no_table, table_in, turned
+from service.readers.table_finder import (
+    MAX_ROWS,
+    TURNED,
+    DataRows,
+    Layout,
+    find_table,
+    is_value,
+    no_table,
+    table_in,
+    turned,
+)
 
 #: Bytes of a block; the first must hold the titles. Chosen: rows that are no plain numbers take 60 times as much memory.
 _BLOCK = 1 << 17
@@ -94,50 +105,82 @@ def read_text(opened: Open, reading: Reading, limits: Limits) -> Table:
 # --- bytes -> lines ---
 
 
-def _blocks(source: ByteSource, encoding: str) -> Iterator[tuple[str, bool]]:
-    """A file's text in blocks of whole lines that all end in a line feed, and whether each is the last; a cell in quotes is
-    not cut.
+class _Block(NamedTuple):
+    """Whole lines, all with a line feed at their end: whether they are the last, whether the last line had one (`ended`),
+    and how many zero bytes follow."""
+
+    text: str
+    last: bool
+    ended: bool = True
+    zeros: int = 0
+
+
+def _blocks(source: ByteSource, encoding: str) -> Iterator[_Block]:
+    """A file's text in blocks of whole lines; a cell in quotes is not cut. Zero bytes at the end are left out.
 
     Raises InvalidError on a line that is too long and on text that is not in its encoding.
     """
     decoder = codecs.getincrementaldecoder("utf-8-sig" if encoding == "utf-8" else encoding)()
     lines = io.IncrementalNewlineDecoder(decoder, translate=True)
-    unfinished, line, block = "", 1, source.read(_BLOCK)
+    unfinished, line, block, zeros = "", 1, source.read(_BLOCK), 0
     while block:
         following = source.read(_BLOCK)
-        last = not following
         try:
-            text = unfinished + lines.decode(block, last)
+            text = unfinished + lines.decode(block, not following)
         except UnicodeError:
-            rule = f"or a line soon after it is not {encoding.upper()}, unlike the lines before: save the file as UTF-8"
+            rule = f"or a line soon after it is not {encoding.upper()}, unlike the lines before: "
+            rule += "this is binary data after text; export the file as text" if b"\0" in block else "save it as UTF-8"
             raise wrong_line(line, rule, "not_text") from None
+        if (nul := text.find("\0")) >= 0:
+            zeros = _zeros_to_the_end(text[nul:], following, source)
+            if zeros == 0:
+                raise _zeros_amid(line + text.count("\n", 0, nul), text[nul:])
+            text, following = text[:nul], b""
+        last = not following
         end = text.rfind("\n") + 1
         if not last and _is_open(text[:end]):
             end = text.rfind("\n", 0, text.rfind('"', 0, end)) + 1
         if len(text) - end > LONGEST_LINE_BYTES + 2 * _BLOCK * ('"' in text[end:]):
             rule = f"must not be longer than {LONGEST_LINE_BYTES} bytes"
             raise wrong_line(line + text.count("\n", 0, end), rule, "line_too_long", text[end : end + MAX_QUOTED])
+        ended = not last or end == len(text)
         if last:
-            text += "" if end == len(text) else "\n"
+            text += "" if ended else "\n"
             end = len(text)
         complete, unfinished = text[:end], text[end:]
-        if (nul := complete.find("\0")) >= 0:
-            rule = "has a NUL byte, which is no text: save the file as UTF-8"
-            raise wrong_line(line + complete.count("\n", 0, nul), rule, "not_text")
-        if complete:
-            yield complete, last
+        if complete or zeros:
+            yield _Block(complete, last, ended, zeros)
         line += complete.count("\n")
         block = following
 
 
+def _zeros_to_the_end(tail: str, following: bytes, source: ByteSource) -> int:
+    """How many zero bytes a text ends in, as a logger leaves that allots its file in blocks; 0 where anything comes after
+    them."""
+    count, stripped = len(tail), tail.strip("\0\r\n")
+    while following and not stripped:
+        count += len(following)
+        stripped, following = following.strip(b"\0\r\n").decode("latin-1"), source.read(_BLOCK)
+    return 0 if stripped else count
+
+
+def _zeros_amid(line: int, tail: str) -> InvalidError:
+    """The error of zero bytes with something after them; `line` has the first of them."""
+    count = len(tail) - len(tail.lstrip("\0"))
+    if BINARY.search(tail.encode("utf-8", "replace")):
+        rule = "begins binary data, which is no text: in the program that wrote the file, export it as text"
+    else:
+        rule = (
+            f"has zero bytes ({count} in a row), as a logger leaves where power was lost; the {line - 1} lines before it "
+            "are text. Send these as one file, and what follows the zeros as another"
+        )
+    return wrong_line(line, rule, "not_text")
+
+
 def _encodings(head: bytes) -> list[str]:
     """The encodings that a text may be in, likeliest first."""
-    if head.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
-        return ["utf-16"]
-    even, odd = head[:512:2], head[1:512:2]
-    for name, zeros, letters in (("utf-16-le", odd, even), ("utf-16-be", even, odd)):
-        if odd and zeros.count(0) > 0.9 * len(odd) and letters.count(0) == 0:
-            return [name]
+    if wide := utf_16(head):
+        return [wide]
     if _decodes(head, "utf-8"):
         return ["utf-8"]
     encodings = [name for name in _ENCODINGS if _decodes(head, name)] or ["latin-1"]
@@ -182,7 +225,7 @@ def _form(first: bytes, reading: Reading, limits: Limits) -> _Form:
 
 
 def _lines(block: bytes, encoding: str) -> list[str]:
-    return "".join(text for text, _ in _blocks(io.BytesIO(block), encoding)).split("\n")[:-1]
+    return "".join(text for text, *_ in _blocks(io.BytesIO(block), encoding)).split("\n")[:-1]
 
 
 def _turned(first: bytes, reading: Reading) -> bytes | None:
@@ -191,7 +234,10 @@ def _turned(first: bytes, reading: Reading) -> bytes | None:
     for separator in _separators(text):
         rows = [cells for _, cells, _ in _rows(text, separator) if any(cells)]
         if on_its_side := turned(rows, named_columns(reading)):
-            return "\n".join("\t".join(row) for row in on_its_side[0]).encode()
+            if not first.endswith((b"\n", b"\r", b"\0")) and not is_whole(rows[-1][-1], rows[-1][1:-1]):
+                rule = "has no line feed at its end and may be cut: send the complete file"
+                raise wrong_line(len(text), rule, "truncated", rows[-1][-1])
+            return "".join("\t".join(row) + "\n" for row in on_its_side[0]).encode()
     return None
 
 
@@ -246,6 +292,14 @@ def _cells(line: str, separator: str) -> list[str]:
     return [cell.strip() for cell in line.split(separator)]
 
 
+def is_whole(cell: str, others: Sequence[str]) -> bool:
+    """Whether the last cell of a text without a line feed at its end is whole: it is empty or in quotes, or has as many
+    decimals as each of the other values."""
+    values = [cell, *filter(is_value, others)]
+    decimals = {len(re.split("[.,]", value, maxsplit=1)[-1]) if re.search("[.,]", value) else 0 for value in values}
+    return not cell or cell.endswith('"') or (len(values) > 1 and len(decimals) == 1 and decimals != {0})
+
+
 def wrong_line(line: int, rule: str, code: str, got: str = "") -> InvalidError:
     """The error of a line that cannot be part of a table; `line` counts from 1."""
     shown = got[:MAX_QUOTED]
@@ -264,6 +318,9 @@ class _DataBody:
         self.data = DataRows(form.rows, form.layout)
         named, first = len(form.layout.headings), self.data.first_row
         self._width = named if any(first[named:]) else max(named, len(first))
+        #: Cells that a row must have: as many as most rows have up to their last that is not empty.
+        filled = (len("".join("x" if cell else " " for cell in row).rstrip()) for row in form.rows[form.layout.start :])
+        self._usual_width = Counter(filled).most_common(1)[0][0] if first else self._width
         self._separator = form.separator
         if form.separator == "  " and len(_cells(" ".join(first), " ")) == self._width:
             self._separator = " "  # titles are two blanks apart, cells may be one
@@ -287,11 +344,17 @@ class _DataBody:
         parts: list[list[NDArray[Any]]] = [[] for _ in channels]
         most = self._limits.most_values // len(channels)
         end, late = time.thread_time() + self._limits.seconds, time.monotonic() + self._limits.wall_seconds
-        for block, last in self._blocks():
+        for block, last, ended, zeros in self._blocks():
             if time.thread_time() > end:
                 raise too_slow(Format.TEXT, self._limits)
             if time.monotonic() > late:
                 raise overdue(Format.TEXT, self._limits)
+            if not ended:
+                block = self._without_cut_line(block, channels)
+            if zeros:
+                line = self._line + block.count("\n") - 1
+                message = f"left out: {zeros} zero bytes after line {line}, as a logger leaves where power was lost"
+                self.data.notices.append(Notice(code="lines_left_out", message=message))
             numbers = None if dated else self._plain(block)
             if numbers is None:
                 columns = self._careful(block, channels, last)
@@ -313,22 +376,41 @@ class _DataBody:
             joined.append((np.ma.concatenate if masked else np.concatenate)(part))
         return joined
 
-    def _blocks(self) -> Iterator[tuple[str, bool]]:
-        """The blocks from the first row of data on, and whether each is the last."""
+    def _blocks(self) -> Iterator[_Block]:
+        """The blocks from the first row of data on."""
         above = self._form.first_line - 1
         with self._opened() as source:
-            for block, last in _blocks(source, self._form.encoding):
+            for block in _blocks(source, self._form.encoding):
                 start = 0
-                while above and start < len(block):
-                    start = block.index("\n", start) + 1
+                while above and start < len(block.text):
+                    start = block.text.index("\n", start) + 1
                     above -= 1
-                if start < len(block):
-                    yield block[start:], last
+                if start < len(block.text) or block.zeros:
+                    yield block._replace(text=block.text[start:])
+
+    def _without_cut_line(self, block: str, channels: Mapping[int, str]) -> str:
+        """The last block without its last line where that has no line feed and may have been cut within a value."""
+        start = block.rfind("\n", 0, -1) + 1
+        line = block[start:-1]
+        cells = _cells(line, self._separator)
+        taken = cells[len(cells) - 1] if len(cells) == max(channels) + 1 else ""
+        above = [
+            row[max(channels)] for row in self._form.rows[self._form.layout.start : -1] if len(row) > max(channels)
+        ]
+        if len(cells) > max(channels) and len(cells) >= self._usual_width and is_whole(taken, above):
+            return block
+        if not (self.rows or start) or not any(map(is_value, cells)):
+            return block  # the only row, or words below the table
+        number = self._line + block.count("\n") - 1
+        why = "which has no line feed at its end and may be cut"
+        message = f"left out: the last line ({number}), {why}: {line[-MAX_QUOTED:]!r}"
+        self.data.notices.append(Notice(code="lines_left_out", message=message))
+        return block[:start]
 
     def _settle(self, channels: Mapping[int, str]) -> None:
         """Learn the decimal sign from the first cell that can be read in one way; a full stop where no cell has a sign."""
         doubtful = False
-        for block, _ in self._blocks():
+        for block, *_ in self._blocks():
             if self._numerals.decimal:
                 return
             if "." in block or ("," in block and (self._separator != "," or '"' in block)):
@@ -397,10 +479,11 @@ class _DataBody:
         return self._numerals.values(channels, columns, self.line_of, self.rows)
 
     def _fit(self, cells: list[str], channels: Mapping[int, str]) -> bool:
-        """Whether a row is one with empty cells at its end, or none of those that are not taken; they are added."""
+        """Whether a row has all that most rows have: empty cells at its end are added, or taken off. One that is shorter may
+        lack any of its cells, and the last one may be cut."""
         while len(cells) > self._width and not cells[-1]:
             cells.pop()
-        if len(cells) > max(channels):
+        if len(cells) > max(*channels, self._usual_width - 1):
             cells += [""] * (self._width - len(cells))
         return len(cells) == self._width
 

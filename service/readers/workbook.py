@@ -4,7 +4,7 @@ Runs in the reading process of `sandbox`. A workbook's numbers are numbers whate
 number is read as CSV's.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,12 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 from python_calamine import CalamineWorkbook, SheetTypeEnum, SheetVisibleEnum
 
-from service.errors import InvalidError
+from service.errors import InvalidError, Notice
 from service.readers.column_names import named_columns, recognised
+from service.readers.constants import one_below_the_other, value_within
 from service.readers.detect import check_archive
 from service.readers.limits import Limits
-from service.readers.table import Reading, Table, index_of_wanted
+from service.readers.table import SHEETS, Reading, Table, index_of_wanted
 from service.readers.table_finder import MAX_ROWS, TURNED, DataRows, Layout, find_table, no_table, table_in, turned
+from service.readers.workbook_cells import SheetCells, sheet_cells
 
 
 def read_table(path: Path, reading: Reading, limits: Limits) -> Table:
@@ -37,13 +39,15 @@ def read_table(path: Path, reading: Reading, limits: Limits) -> Table:
     tables: dict[str, tuple[list[Sequence[Any]], Layout]] = {}
     refused: list[InvalidError] = []
     on_side: set[str] = set()
+    hidden: dict[str, set[int]] = {}
     for name in sheets:
-        rows = [_trimmed(row) for row in book.get_sheet_by_name(name).to_python(skip_empty_area=False)]
+        rows, hidden[name] = _rows(book, name, path if packed else None)
         rows[: reading.skip_rows] = [()] * len(rows[: reading.skip_rows])
         layout = find_table(rows[: reading.skip_rows + MAX_ROWS], frozenset(), named)
         if layout is None and len(rows) <= MAX_ROWS and (on_its_side := turned(rows, named)):
             rows, layout = on_its_side
             on_side.add(name)
+            hidden[name] = set()  # its channels
         if layout is None:
             refused.append(no_table(rows[: reading.skip_rows + MAX_ROWS], named))
         elif len(sheets) == 1 or recognised([heading[0] for heading in layout.headings], named):
@@ -52,9 +56,43 @@ def read_table(path: Path, reading: Reading, limits: Limits) -> Table:
         raise refused[0]
     visible = {sheet.name for sheet in book.sheets_metadata if sheet.visible == SheetVisibleEnum.Visible}
     tables = {name: cells for name, cells in tables.items() if name in visible} or tables
+    if channel := next((of for of, choice in reading.mapping.items() if choice.column == SHEETS), None):
+        return _stacked_sheets(channel, tables, hidden, tuple(sheets), limits)
     name = list(tables)[index_of_wanted(list(tables) or sheets, "", "sheet")]
-    table = _table(name, *tables[name], tuple(sheets), limits)
+    table = _table(name, *tables[name], hidden[name], tuple(sheets), limits)
     return replace(table, notices=[*table.notices, TURNED]) if name in on_side else table
+
+
+def _stacked_sheets(
+    channel: str,
+    tables: dict[str, tuple[list[Sequence[Any]], Layout]],
+    hidden: Mapping[str, Collection[int]],
+    sheets: tuple[str, ...],
+    limits: Limits,
+) -> Table:
+    """The sheets whose names state a value of a channel, one below the other."""
+    named = {name: held[0] for name in tables if (held := value_within(name, channel))}
+    parts = [_table(name, *tables[name], hidden[name], sheets, limits) for name in named]
+    titles = [[(column.name, column.unit) for column in part.columns] for part in parts]
+    if not parts or any(own != titles[0] for own in titles):
+        message = f"map gives {channel} the values in the names of sheets, which must have the same columns"
+        raise InvalidError.of(message, code="invalid_map", pointer="/map", value=SHEETS)
+    first = replace(parts[0], name="", notices=[notice for part in parts for notice in part.notices])
+    return one_below_the_other(
+        first, channel, [*named.values()], lambda taken: [part.read(taken) for part in parts], SHEETS
+    )
+
+
+def _rows(book: CalamineWorkbook, sheet: str, path: Path | None) -> tuple[list[Sequence[Any]], set[int]]:
+    """The rows of a sheet and which are hidden; with the names of error values, and formulas that have no value, in their
+    cells. `path`: of a file whose cells can be looked at."""
+    rows = book.get_sheet_by_name(sheet).to_python(skip_empty_area=False)
+    said = SheetCells() if path is None else sheet_cells(path, sheet)
+    for (row, column), text in said.texts.items():
+        rows += [[] for _ in range(row + 1 - len(rows))]
+        rows[row] += [""] * (column + 1 - len(rows[row]))
+        rows[row][column] = text
+    return [_trimmed(row) for row in rows], said.hidden
 
 
 def _trimmed(row: Sequence[Any]) -> Sequence[Any]:
@@ -65,11 +103,25 @@ def _trimmed(row: Sequence[Any]) -> Sequence[Any]:
     return row[:end]
 
 
-def _table(name: str, rows: list[Sequence[Any]], layout: Layout, sheets: tuple[str, ...], limits: Limits) -> Table:
+def _table(
+    name: str,
+    rows: list[Sequence[Any]],
+    layout: Layout,
+    hidden: Collection[int],
+    sheets: tuple[str, ...],
+    limits: Limits,
+) -> Table:
     limits.require_columns(len(layout.headings))
     data = DataRows(rows, layout)
-    lines, cells = data.of(enumerate(rows[layout.start :], layout.start + 1), 0, last=True)
+    shown = ((at + 1, rows[at]) for at in range(layout.start, len(rows)) if at not in hidden)
+    lines, cells = data.of(shown, 0, last=True)
     data.end()
+    out = [at + 1 for at in sorted(hidden) if layout.start <= at < len(rows)]
+    if out:
+        listed = ", ".join(map(str, out[:10])) + (" ..." if len(out) > 10 else "")
+        hidden_rows = f"{len(out)} hidden row{'s' * (len(out) > 1)} of the sheet"
+        message = f"left out: {hidden_rows}: {listed}. To have them read, unhide them"
+        data.notices.append(Notice(code="lines_left_out", message=message))
 
     def read(channels: Mapping[int, str]) -> list[NDArray[Any]]:
         columns = []

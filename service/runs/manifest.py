@@ -6,7 +6,7 @@ The manifest, `runs.json`, holds for each record file (CSV, TDMS, MDF4, Parquet)
     [{"file": "a.csv", "kind": "stationary_stribeck", "cycles": 0, "run_id": "a", "origin": "measured",
       "started_at": "2026-11-02T08:00:00+01:00", "map": "torque_nm:Mz"}, ...]
 
-where `file`, `kind` and `cycles` are needed; `decimal` and `missing` may stand too.
+where `file`, `kind` and `cycles` are needed; `decimal`, `missing` and `good` may stand too.
 Nothing outside the folder is read for it: a manifest that came with recordings
 must not name other files of the machine, neither by a path nor by a link.
 """
@@ -28,7 +28,7 @@ INSPECTIONS = "inspections"
 ANSWER = "answer.json"
 #: Cycles from which a file is not taken for a run. Chosen: far beyond what the service accepts (`api.base`).
 _MAX_CYCLES = 1e15
-_NEEDED, _OPTIONAL = ("file", "kind", "cycles"), ("run_id", "origin", "started_at", "map", "decimal", "missing")
+_NEEDED, _OPTIONAL = ("file", "kind", "cycles"), ("run_id", "origin", "started_at", "map", "decimal", "missing", "good")
 _RECORDS = (
     ".csv", ".txt", ".tsv", ".asc", ".dat", ".lvm", ".tdms", ".mf4", ".mdf", ".parquet", ".xlsx", ".xls", ".ods", ".mat",
     ".h5", ".hdf5", ".zip",

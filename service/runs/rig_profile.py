@@ -120,7 +120,8 @@ def _count(text: str | None) -> float | None:
 
 def fits(profile: Mapping[str, Any], titles: Collection[str]) -> bool:
     """Whether a file has the columns of a stored profile and no others, whatever their case and blanks."""
-    return {_plain(column["title"]) for column in profile["columns"]} == {_plain(title) for title in titles}
+    own = [column["title"] for column in profile["columns"] if not column["title"].startswith("=")]
+    return {_plain(title) for title in own} == {_plain(title) for title in titles}
 
 
 def _plain(title: str) -> str:

@@ -114,6 +114,7 @@ def reading_with(profile: RigProfile | None, reading: Reading) -> Reading:
         decimal=reading.decimal or profile.decimal or "",
         skip_rows=reading.skip_rows or profile.skip_rows,
         missing=reading.missing or profile.missing or "",
+        good=reading.good or profile.good or "",
     )
 
 

@@ -64,7 +64,7 @@ def as_answered(answer: BaseModel) -> Any:
 def csv_text(channels: dict[str, list[float]]) -> str:
     """Channels as a file of comma-separated values."""
     rows = zip(*channels.values(), strict=True)
-    return "\n".join([",".join(channels), *(",".join(map(repr, row)) for row in rows)])
+    return "".join(line + "\n" for line in [",".join(channels), *(",".join(map(repr, row)) for row in rows)])
 
 
 def _as_it_is(_client: TestClient) -> None:

@@ -48,6 +48,7 @@ def push(
     channel_map: options.ChannelMap = None,
     decimal: options.Decimal = None,
     missing: options.Missing = None,
+    good: options.Good = None,
 ) -> None:
     """Send run files to the service.
 
@@ -58,7 +59,7 @@ def push(
     While the service is away, runs wait in the spool; the next call sends them first. A corrected file replaces the
     version that waits.
     """
-    reading = {"map": channel_map, "decimal": decimal, "missing": missing}
+    reading = {"map": channel_map, "decimal": decimal, "missing": missing, "good": good}
     with options.errors_in_a_line():
         try:
             files = manifest.find(paths)

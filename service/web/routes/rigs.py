@@ -90,6 +90,7 @@ async def preview_file(
     map: parameters.FileMap = None,  # noqa: A002
     decimal: parameters.FileDecimal = "",
     missing: parameters.FileMissing = "",
+    good: parameters.FileGood = "",
 ) -> Response:
     """A preview of a file: its first rows, the channel and unit of each column, what would be cut and fitted. Nothing
     is stored. Without `rig` or a `profile` in the form, the saved profile that has the file's columns is used, else
@@ -108,7 +109,7 @@ async def preview_file(
             kind=kind,
             cycles=cycles,
             clutch_id=clutch_id,
-            reading=reading_of(map, decimal=decimal, missing=missing),
+            reading=reading_of(map, decimal=decimal, missing=missing, good=good),
         )
         shown = await asyncio.wrap_future(context.workers.submit(Lane.FILES, computing, path))
     return json_answer(shown)

@@ -72,6 +72,7 @@ async def post_run_file(
     decimal: parameters.FileDecimal = "",
     skip_rows: parameters.FileSkipRows = 0,
     missing: parameters.FileMissing = "",
+    good: parameters.FileGood = "",
     filename: parameters.FileName = "upload",
     run_id: parameters.FileRunId = None,
     started_at: parameters.FileStartedAt = None,
@@ -90,7 +91,9 @@ async def post_run_file(
             filename=filename,
             kind=kind,
             cycles=cycles,
-            reading=reading_of(map, table=table, time=time, decimal=decimal, skip_rows=skip_rows, missing=missing),
+            reading=reading_of(
+                map, table=table, time=time, decimal=decimal, skip_rows=skip_rows, missing=missing, good=good
+            ),
             profile=content or profile,
             rig=None if content else rig,
             run_id=run_id,

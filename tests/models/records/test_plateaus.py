@@ -10,6 +10,7 @@ from scipy.signal import cont2discrete, lfilter
 
 from models.arrays import FloatArray
 from models.friction.identification import fit_curves, mean_torques
+from models.records.cleaning import UnusableRecordError, missing_samples
 from models.records.plateaus import PlateauCut, cut_plateaus
 from models.records.runs import Plateaus, Record, curves_by_pressure
 from tests.models.records.raw_records import (
@@ -128,6 +129,42 @@ def test_lost_samples(reference, gap):
     assert np.unique(of(cut, reference)).size >= reference.start.size - 2
     assert (np.abs(off(cut, reference)) < 5).all()
     assert dict(cut.notes)["samples_missing"].startswith(f"About {reference.record.time.size - record.time.size} ")
+
+
+def test_rows_that_were_stored_on_change_are_refused_with_the_way_to_give_them():
+    """A dead band of 20 rpm, and a row every two seconds in any case."""
+    rng = np.random.default_rng(13)
+    record = make(*protocol(rng, TENTH), rng, rate=50.0, ramp=0.5).record
+    kept, last = [0], 0
+    for row in range(1, record.time.size):
+        moved = abs(record.speed[row] - record.speed[last]) > 20 * RPM
+        if moved or record.time[row] - record.time[last] > 2:
+            kept.append(row)
+            last = row
+    with pytest.raises(UnusableRecordError, match="only when a value has changed"):
+        cut_plateaus(record.take(np.array(kept)))
+
+
+def test_a_recorder_that_is_started_for_each_dwell_is_read(reference):
+    record = reference.record
+    within = [
+        (record.time > start + 1) & (record.time < stop)
+        for start, stop in zip(reference.start, reference.stop, strict=True)
+    ]
+    cut = cut_plateaus(record.take(np.logical_or.reduce(within)))
+    assert np.unique(of(cut, reference)).size >= reference.start.size - 2
+
+
+@pytest.mark.parametrize(("step", "said"), [(0.0, []), (1.0, ["100 samples"]), (3600.0, ["360000 samples"])])
+@pytest.mark.parametrize("unit", [1e-6, 0.01])
+def test_a_clock_that_is_set_forwards_is_noted_whatever_its_resolution(step, said, unit):
+    times = np.round(0.01 * np.arange(3000) * (1.23 if unit > 1e-3 else 1.0) / unit) * unit
+    times[1500:] += step
+    notes = missing_samples(times)
+    assert [code for code, _ in notes] == ["samples_missing"] * len(said)
+    if said and unit < 1e-3:
+        assert f"About {said[0]}" in notes[0][1]
+        assert "A clock that was set forwards there looks the same" in notes[0][1]
 
 
 def test_a_clock_that_jitters_and_a_gap_that_parts_a_dwell(reference) -> None:

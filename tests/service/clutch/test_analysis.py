@@ -213,3 +213,18 @@ def test_the_tracked_model_stands_beside_a_measured_engagement(client: TestClien
     remaining = client.get(f"{CLUTCH}/remaining-useful-life", params={"quantity": "stop_time_s"})
     assert remaining.status_code == 200, remaining.text
     assert [item["quantity"] for item in remaining.json()["criteria"]] == ["stop_time_s"]
+
+
+@pytest.mark.parametrize("step", [1.0, 3600.0])
+def test_a_clock_that_is_set_forwards_is_said_of_a_dynamic_test(client: TestClient, step: float) -> None:
+    sent = swing(late=False)
+    times = sent["channels"]["time_s"]
+    middle = len(times) // 2
+    sent["channels"]["time_s"] = [*times[:middle], *(time + step for time in times[middle:])]
+    receipt = post_run(client, sent)
+    (missing,) = [warning for warning in receipt["warnings"] if warning["code"] == "samples_missing"]
+    assert (
+        f"the longest gap is {step + times[middle] - times[middle - 1]:.4g} s at {times[middle - 1]:.3f} s"
+        in missing["message"]
+    )
+    assert post_run(client, swing(late=False) | {"run_id": "even"})["warnings"] == []

@@ -120,7 +120,7 @@ def test_words_in_parquet_are_refused(tmp_path: Path) -> None:
 
 
 def test_a_renamed_picture_is_refused(tmp_path: Path) -> None:
-    for content, message in ((b"\x89PNG\r\n\x1a\n", "PNG picture"), (b"RIFF", "is not a TDMS file, although its name")):
+    for content, message in ((b"\x89PNG\r\n\x1a\n", "PNG picture"), (b"RIFX", "is not a TDMS file, although its name")):
         with pytest.raises(InvalidError, match=message):
             read_content(tmp_path, content + bytes(100), name="a.tdms")
 

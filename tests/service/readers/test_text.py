@@ -78,7 +78,7 @@ def test_numbers_are_read_as_python_reads_them(tmp_path: Path, number: str) -> N
     [
         f"# made by a bench\n% 2026\n// x\n; y\n\n{HEADER}\n\n{ROWS}",
         '"time_s" , "pressure_bar" , "speed_rpm" , "torque_nm"\n"0","5","100","20"\n"0.1","5","101","21"\n',
-        f"{HEADER}\n0 , 5, 100,20\n# a pause\n\n 0.1,5 ,101, 21",
+        f"{HEADER}\n0 , 5, 100,20\n# a pause\n\n 0.1,5 ,101, 21\n",
         "time_ms\tpressure_kPa\tspeed_rpm\tTorque Nm\n0\t500\t100\t20\n100\t500\t101\t21\n",
         f"time_s,pressure_bar,speed_rpm,torque\r[s],[bar],[rpm],[Nm]\n{ROWS}",
         f"{HEADER}\n0e0,+5.,1E2,2.0e+1\n1e-1,.5e1,101,2100e-2\n",
@@ -103,7 +103,7 @@ WRONG = [
     (f"{HEADER}\n{ROWS}#\n0.2,5,NaN,20\n", r"speed_rpm\[2\] \(line 5\) must be finite, got nan"),
     (f"{HEADER}\n{ROWS}0.2,-9,100,20\n", r"pressure_bar\[2\] \(line 4\) must lie between .* got -9"),
     (f"{HEADER}\n{ROWS}0.2,5,0x10,20\n", "'0x10'"),
-    (f"{HEADER}\n{ROWS}0.2,5,1\x000,20\n", "line 4 has a NUL byte, which is no text"),
+    (f"{HEADER}\n{ROWS}0.2,5,1\x000,20\n", r"line 4 has zero bytes \(1 in a row\), .*; the 3 lines before it are text"),
     (
         "time_s;torque_nm\n0,5;1,5\n1.5;2\n",
         r"time_s\[1\] \(line 3\) must have the decimal sign ',', as earlier numbers have, got '1.5'",
@@ -117,7 +117,7 @@ WRONG = [
     (",".join("a" * 2000) + "\n" + ",".join("1" * 2000) + "\n", "more than 1000 columns, got 2000"),
     (f"{HEADER}\n" + "1" * 100_000 + "\n", "line 2 must have 4 cells, got 1"),
     (b"\x89PNG\r\n\x1a\n" + bytes(range(256)) * 40, "PNG picture"),
-    (bytes(range(256)) * 400, "NUL"),
+    (bytes(range(256)) * 400, "got binary data of a format that is not read here"),
     (b"PK\x03\x04" + bytes(100), "ZIP archive cannot be read"),
     (gzip.compress(HEADER.encode(), mtime=0)[:-6], "cannot be unpacked"),
     (gzip.compress(gzip.compress(HEADER.encode(), mtime=0), mtime=0), "twice with gzip"),

@@ -162,21 +162,24 @@ export function importer(file, number, run) {
   }
 
   /** @param {Preview} shown */
-  function options({ profile, tables }) {
-    const attributes = (/** @type {"decimal" | "table" | "missing"} */ name) => ({
+  function options({ profile, tables, problem }) {
+    const attributes = (/** @type {"decimal" | "table" | "missing" | "good"} */ name) => ({
       id: `${name}-${number}`,
       onchange: (/** @type {any} */ event) => {
         const { value } = event.target; // a sheet's name may end in a space
-        edit((edited) => Object.assign(edited, { [name]: (name === "missing" ? value.trim() : value) || null }));
+        edit((edited) => Object.assign(edited, { [name]: (name === "table" ? value : value.trim()) || null }));
       },
     });
     const marks = Object.entries({ "": "found", ",": "comma: 1.234,5", ".": "point: 1,234.5" });
     const sheets = ["", ...tables].map((name) => /** @type {[string, string]} */ ([name, name || "the only one"]));
     const missing = h("input", { ...attributes("missing"), value: profile.missing ?? "" });
+    const good = h("input", { ...attributes("good"), value: profile.good ?? "" });
+    const asked = profile.good !== null || problem?.includes("good=");
     return h(
       "div.fields",
       field(select(attributes("decimal"), marks, profile.decimal ?? ""), "Decimal mark"),
       field(missing, "Missing values", h("small", "for example -9999, n/a; “none” if every number is a measurement")),
+      asked && field(good, "Codes of good rows", h("small", "for example 0 or 192; “none” reads all rows")),
       tables.length > 1 && field(select(attributes("table"), sheets, profile.table ?? ""), "Sheet or test"),
     );
   }
