@@ -100,7 +100,7 @@ def test_everything_says_the_same(browser: Browser, server: Server, tmp_path: Pa
         worn = over and life["ended"]["reason"] == "worn"
         assert (state["name"] == "failure") is (life["status"] == "reached" or worn), where
         assert clutch["headline"].startswith(f"{STATE_WORDS[state['name']]}: "), where
-        assert ("Replace" in clutch["action"] or "replace the" in clutch["action"]) is (
+        assert ("Replace " in clutch["action"] or "replace the" in clutch["action"]) is (
             state["name"] in ("failure", "maintenance") and not over
         ), where
         health = life["current"]["health"]

@@ -207,7 +207,7 @@ def advising(test: str, effect: str) -> LatestDiagnosis:
         ),
         (
             summary(9000.0, current={"health": 0.12}), None,
-            "Normal: safe for 9,000", "Carry on testing with a replacement at hand: health 12 %.",
+            "Normal: safe for 9,000", "Have a replacement at hand: health 12 %.",
         ),
         (summary(900.0, pace=PACE), None, "Maintenance required: ", "Replace within less than a day at the pace so far"),
         (summary(0.4, pace=PACE), None, "Maintenance required: ", "Replace now."),
