@@ -194,18 +194,19 @@ def _new_levels(row: ClutchRow) -> frozenset[str]:
 def event_of(row: RunInOrder, cofs: ByPressure) -> Event:
     """A stored run as the history sees it."""
     low, high = row.lowest_speed, row.highest_speed
+    moment, dated = moment_of(row.started_at, row.received_at)
     return Event(
         run_id=row.run_id,
         kind=row.kind,
         cycles=row.cycles,
-        moment=moment_of(row.started_at, row.received_at),
+        moment=moment,
         arrived=row.run_key,
         speed_range=None if low is None or high is None else (low, high),
         oil_temperature=row.oil_temperature,
         cofs=cofs,
         **maintenance_fields(row.event, row.reason),
         duty=duty_block(row.cycles, row.duty_cycles, row.duty_energy_kj, row.duty_speed_rpm, row.duty_duration_s),
-        dated=row.started_at is not None,
+        dated=dated,
         shown=None if row.shown is None else Shown.from_list(json.loads(row.shown)),
         confirmed=bool(row.doubted),
     )

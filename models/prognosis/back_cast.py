@@ -35,15 +35,17 @@ from models.tracking.prior import TrackPrior
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BackCast:
     """`forecasts` [f, 2 + 3 a]: progress and epoch of each, then at each of AHEAD its lower end, median and upper end;
-    `misses` [m] of the tests that were judged, negative where they lay below the median."""
+    `misses` [m] of the tests that were judged, negative where they lay below the median; `innovation` of the newest test by
+    those before it [1], or [0] where there is none (`models.tracking.innovation`)."""
 
     forecasts: FloatArray
     misses: FloatArray
+    innovation: FloatArray
 
     @classmethod
     def nothing(cls) -> "BackCast":
         """Before the first test."""
-        return cls(forecasts=np.zeros((0, 2 + 3 * len(AHEAD))), misses=np.zeros(0))
+        return cls(forecasts=np.zeros((0, 2 + 3 * len(AHEAD))), misses=np.zeros(0), innovation=np.zeros(0))
 
     @property
     def held(self) -> int:

@@ -115,6 +115,7 @@ def ends_of_life(
 
     Of a draw that has a discrepancy, or with an offset, only passages up to the horizon are computed.
     """
+    posterior = posterior.of_clutch
     threshold = fraction * posterior.initial
     crossing = general_order.first_passage(threshold, posterior.degradation)
     passages = np.where(posterior.initial <= threshold, 0.0, crossing)
@@ -146,8 +147,8 @@ def widened(
 
 
 def paths(posterior: TrackPosterior, progress: FloatArray, offset: Offset | None = None) -> FloatArray:
-    """ξ(ζ) + offset(ζ) at progress [k] of every draw; [k, n]."""
-    values = posterior.values(progress)
+    """ξ(ζ) + offset(ζ) of the clutch at progress [k] of every draw; [k, n]."""
+    values = posterior.of_clutch.values(progress)
     return values if offset is None else np.asarray(values + posterior.beside(offset(progress)))
 
 

@@ -10,8 +10,8 @@ test: with p the prior probability, Z the two evidences and A the share of the f
     P = p Z_1/(p Z_1 + (1 - p) Z_0 A),
 
 and those that end before are left out. A course led back over a long life that no test has seen asks for a value when new
-far above the first one, which has ended by then or is improbable. The exact filter computes both evidences under the weak
-prior, for whichever filter asks.
+far above the first one, which has ended by then or is improbable. The exact filter computes both evidences under the priors
+in force, a fleet's among them, for whichever filter asks.
 """
 
 import math
@@ -29,8 +29,8 @@ from models.prognosis.ended_lives import ObservedLife, as_its_kind
 from models.prognosis.first_passage import Offset, ends_of_life, paths, widened
 from models.tracking.filters.grid import Grid
 from models.tracking.measurement import Measurement
-from models.tracking.posterior import TrackPosterior
-from models.tracking.prior import weak
+from models.tracking.posterior import TrackPosterior, joined
+from models.tracking.prior import TrackPrior, weak
 
 _GRID, _DRAWS = Grid(nodes=13, rows=13, levels=7), 500
 
@@ -59,10 +59,20 @@ class LateStart:
         return probability, alive * ((1.0 - probability) / share)
 
 
+#: Priors with their probabilities, which sum to one.
+WeightedPriors = tuple[tuple[float, TrackPrior], ...]
+
+
 def late_start(
-    tests: Sequence[Measurement], fraction: float, *, offset: Offset | None, horizon: float
+    tests: Sequence[Measurement],
+    fraction: float,
+    *,
+    offset: Offset | None,
+    horizon: float,
+    priors: WeightedPriors = (),
 ) -> LateStart | None:
-    """Of a clutch by its tests; its end is where ξ + offset first is at a fraction of that when new. `offset` gives [1, k].
+    """Of a clutch by its tests and the priors in force (none: the weak one); its end is where ξ + offset first is at a
+    fraction of that when new. `offset` gives [1, k].
 
     None where the first test came within the share LATE_START of what was measured, for where it was new is then much the
     same; and of fewer than FEWEST_TESTS tests at different ζ.
@@ -71,7 +81,7 @@ def late_start(
     if len(progress) < FEWEST_TESTS or min(progress) <= LATE_START * max(progress):
         return None
     begun = min(progress)
-    log_odds, drawn = _weighed(tuple(tests), begun)
+    log_odds, drawn = _weighed(tuple(tests), begun, priors)
     since = None if offset is None else lambda progress: offset(progress + begun)
     return LateStart(
         begun=begun,
@@ -84,15 +94,25 @@ def late_start(
 
 
 @lru_cache(maxsize=8)
-def _weighed(tests: tuple[Measurement, ...], begun: float) -> tuple[float, TrackPosterior]:
+def _weighed(tests: tuple[Measurement, ...], begun: float, priors: WeightedPriors) -> tuple[float, TrackPosterior]:
     """The log odds that the clutch was new at its first test, and draws if it was; kept for the next filter."""
-    prior = weak(min(tests, key=lambda test: test.progress), falling=True)
+    priors = priors or ((1.0, weak(min(tests, key=lambda test: test.progress), falling=True)),)
     since = [replace(test, progress=test.progress - begun) for test in tests]
-    whole, later = (_GRID.from_history(prior, each) for each in (tests, since))
-    laid = _GRID.laid(later)
-    log_odds = laid.log_evidence - _GRID.laid(whole).log_evidence
+    log_whole, log_later, parts = [], [], []
+    for probability, prior in priors:
+        whole, later = (_GRID.from_history(prior, each) for each in (tests, since))
+        laid = _GRID.laid(later)
+        # the exact filter leaves out what is the same for all points of a prior
+        log_scale = math.log(probability) - math.log(prior.log_scale_sd * prior.log_exponent_sd * prior.log_scatter_sd)
+        log_whole.append(log_scale + _GRID.laid(whole).log_evidence)
+        log_later.append(log_scale + laid.log_evidence)
+        parts.append(_GRID.drawn(later, laid, _DRAWS // len(priors), np.random.default_rng(0)))
+    total = float(np.logaddexp.reduce(log_later))
+    log_odds = total - float(np.logaddexp.reduce(log_whole))
     log_odds += math.log(COUNTED_ELSEWHERE / (1.0 - COUNTED_ELSEWHERE))
-    return log_odds, _GRID.drawn(later, laid, _DRAWS, np.random.default_rng(0))
+    shares = np.exp(np.array(log_later) - total).tolist()
+    drawn = [replace(part, weight=share * part.weight) for share, part in zip(shares, parts, strict=True)]
+    return log_odds, joined(drawn)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -126,16 +146,18 @@ def stated_end(
     powers: tuple[float, float] = (1.0, 1.0),
     ended: Sequence[ObservedLife] = (),
     tests: Sequence[Measurement] = (),
+    priors: WeightedPriors = (),
 ) -> StatedEnd:
     """The end of a life that is at ζ = `as_of`, as `posterior` has it, its remaining part `widened` by `powers`.
 
-    By its `tests` it may have been new at the first of them; and what lies ahead of it is that of a clutch like the `ended`
-    ones, with the probability that it is of their kind. What is behind, and a life that is over more likely than not, stays.
+    By its `tests`, under the `priors` in force, it may have been new at the first of them; and what lies ahead of it is that
+    of a clutch like the `ended` ones, with the probability that it is of their kind. What is behind, and a life that is over
+    more likely than not, stays.
     """
     ends = ends_of_life(posterior, fraction, offset=offset, horizon=horizon)
     weight, form = posterior.weight, posterior.form
     mean_offset = None if offset is None else lambda progress: _mean(posterior, offset(progress))
-    elsewhere, late = late_start(tests, fraction, offset=mean_offset, horizon=horizon), None
+    elsewhere, late = late_start(tests, fraction, offset=mean_offset, horizon=horizon, priors=priors), None
     if elsewhere is not None:
         fresh = paths(posterior, np.zeros(1), offset)[0]
         probability, weight = elsewhere.weighed(ends, weight)

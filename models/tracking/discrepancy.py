@@ -12,11 +12,13 @@ falls faster by g times its mean pace of wear until then,
 
     ξ(ζ) = min(ξ(ζ), ξ(ζ_k)) - g w/ζ_k (ζ - ζ_k),   w = max(ξ0 - ξ(ζ_k), 0) + u ξ0,
 
-where a small share u of the value when new counts as worn whatever is seen: what runs in or stays level will wear. A knee
-comes with the probability p, and if so at any time: P(none until ζ) = 1 - p (1 - T/ζ), whose scale is that of what was
-tested; before a second test there is none. A knee that is behind is part of δ, whose slope goes on.
+where a small share u of the value when new counts as worn whatever is seen: what runs in or stays level will wear.
+Before any sign of it, a knee may come at any time: P(none until ζ) = (T/ζ)^h; to eq. 6 alone, while it shows no wear, up to
+twice T: that it has not worn says nothing of how soon it may. Before a second test there is none. A knee that is behind is
+part of δ, whose slope goes on.
 
-An event such as an oil change begins an epoch, whose level is off by a normal step from the one before.
+An event such as an oil change begins an epoch, whose level is off by a normal step from the one before. The step of a
+sensor that was zeroed is one of the readings: the clutch is as it was.
 
 Source: the integrated Wiener process as a prior of smooth functions is G. Wahba, J. R. Statist. Soc. B 40 (1978) 364;
 a discrepancy beside a law of physics is M. C. Kennedy, A. O'Hagan, J. R. Statist. Soc. B 63 (2001) 425.
@@ -29,7 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
-from models.tracking.criteria import KNEE_PACE, LEVELLING, LOG_KNEE_PACE_SD, UNSEEN_WEAR
+from models.tracking.criteria import KNEE_PACE, KNEE_REACH, LEVELLING, LOG_KNEE_PACE_SD, UNSEEN_WEAR
 from models.tracking.history import LEAST_SPAN, History, later_epochs, span_of
 from models.tracking.prior import TrackPrior
 
@@ -94,8 +96,8 @@ class CourseDiscrepancy:
     """Courses beside eq. 6, one for each of n draws, in the unit of the quantity.
 
     `span` is T; `size` [n] is q; `curvature` [n, PAST + FUTURE] multiplies `smooth`; the level steps by `height`
-    [n, e] at progress `at` [e]. From the progress `knee` [n] on, inf where there is none, a course falls faster by
-    `steepening` [n] times its mean pace of wear until then.
+    [n, e] at progress `at` [e], and where `of_readings` [e] says so (None: nowhere) a sensor's alone. From the progress
+    `knee` [n] on, inf where there is none, a course falls faster by `steepening` [n] times its mean pace of wear until then.
     """
 
     span: float
@@ -105,6 +107,14 @@ class CourseDiscrepancy:
     height: FloatArray
     knee: FloatArray
     steepening: FloatArray
+    of_readings: NDArray[np.bool_] | None = None
+
+    @property
+    def of_clutch(self) -> "CourseDiscrepancy":
+        """The courses without the steps that are a sensor's: what the clutch does, not what is read."""
+        if self.of_readings is None or not self.of_readings.any():
+            return self
+        return replace(self, height=np.where(self.of_readings, 0.0, self.height))
 
     def __call__(self, own: FloatArray, progress: FloatArray) -> FloatArray:
         """δ at each draw's own time [k, n], plus the steps up to ζ, [k, n] or [k, 1]; [k, n]."""
@@ -169,9 +179,10 @@ def drawn(
     alive = size > 0.0
     ahead[alive] = rng.standard_normal((int(alive.sum()), FUTURE)) * (size[alive] * prior.size)[:, None]
     knee, steepening = np.full(size.size, np.inf), np.ones(size.size)
-    if prior.knee_probability > 0.0 and history.progress.max(initial=0.0) > LEAST_SPAN:
-        ahead_of_knee = (alive | (worn < UNSEEN_WEAR)) & (rng.random(size.size) < prior.knee_probability)
-        knee[ahead_of_knee] = history.span / (1.0 - rng.random(int(ahead_of_knee.sum())))
+    if prior.knee_hazard > 0.0 and history.progress.max(initial=0.0) > LEAST_SPAN:
+        times = rng.random(size.size) ** (-1.0 / prior.knee_hazard)
+        begins = alive | ((worn < UNSEEN_WEAR) & (times < KNEE_REACH))
+        knee[begins] = history.span * times[begins]
         steepening = KNEE_PACE * np.exp(LOG_KNEE_PACE_SD * rng.standard_normal(size.size))
     return CourseDiscrepancy(
         span=history.span,
@@ -181,4 +192,5 @@ def drawn(
         height=terms[:, PAST:],
         knee=knee,
         steepening=steepening,
+        of_readings=history.reading_steps,
     )

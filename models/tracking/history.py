@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
+from numpy.typing import NDArray
 
 from models.arrays import FloatArray
 from models.tracking.criteria import LEVEL_SIZE
@@ -20,18 +21,20 @@ LEAST_SPAN = 1e-6
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class History:
-    """The measurements so far, in the order they came: progress, value, variance, epoch, new levels, each [t]."""
+    """The measurements so far, in the order they came: progress, value, variance, epoch, new levels and zeroed sensors, each
+    [t]."""
 
     progress: FloatArray
     value: FloatArray
     variance: FloatArray
     epoch: FloatArray
     new_levels: FloatArray
+    sensor: FloatArray
 
     @classmethod
     def of(cls, measurements: Sequence[Measurement], prior: TrackPrior) -> "History":
         """The columns of a sequence of measurements, possibly empty, with the variance of their resolution added."""
-        rows = np.array([_row(m, prior) for m in measurements], dtype=np.float64).reshape(-1, 5)
+        rows = np.array([_row(m, prior) for m in measurements], dtype=np.float64).reshape(-1, 6)
         return cls(**{field.name: rows[:, column].copy() for column, field in enumerate(fields(cls))})
 
     def append(self, measurement: Measurement, prior: TrackPrior) -> "History":
@@ -52,7 +55,15 @@ class History:
 
     def step_sizes(self, prior: TrackPrior) -> FloatArray:
         """The deviations of these steps, as shares of the size of the quantity [e]."""
-        return step_sizes(self.epoch, self.new_levels, prior.step_size)
+        sizes = step_sizes(self.epoch, self.new_levels, prior.step_size)
+        return np.where(self.reading_steps, LEVEL_SIZE, sizes)
+
+    @property
+    def reading_steps(self) -> NDArray[np.bool_]:
+        """Which of these steps [e] are a sensor's alone: it was zeroed, and no other event lies there."""
+        first = np.unique(self.epoch, return_index=True)[1]
+        epochs, levels, zeroed = (np.diff(each[first]) for each in (self.epoch, self.new_levels, self.sensor))
+        return np.asarray((zeroed > 0) & (epochs <= zeroed + levels))
 
     def to_arrays(self) -> dict[str, FloatArray]:
         """The columns by name."""
@@ -85,4 +96,11 @@ def step_sizes(epoch: FloatArray, new_levels: FloatArray, step_size: float) -> F
 def _row(measurement: Measurement, prior: TrackPrior) -> tuple[float, ...]:
     resolution = _RESOLUTION * math.hypot(prior.initial_sd, prior.change_sd)
     variance = measurement.variance + resolution**2
-    return measurement.progress, measurement.value, variance, measurement.epoch, measurement.new_levels
+    return (
+        measurement.progress,
+        measurement.value,
+        variance,
+        measurement.epoch,
+        measurement.new_levels,
+        measurement.sensor,
+    )

@@ -10,7 +10,8 @@ class Measurement:
 
     `epoch` >= 0 counts the events so far that may have shifted the level (an oil change, a zeroed sensor): measurements
     of one epoch share a level. `new_levels` >= 0 of these epochs begin with a level that the tests show to be new,
-    whether or not an event declares it. Raises ValueError where a number is not finite or negative where it must not be.
+    whether or not an event declares it; `sensor` >= 0 of the events zeroed a sensor, which shifts readings alone. Raises
+    ValueError where a number is not finite or negative where it must not be.
     """
 
     progress: float
@@ -18,12 +19,15 @@ class Measurement:
     variance: float
     epoch: int = 0
     new_levels: int = 0
+    sensor: int = 0
 
     def __post_init__(self) -> None:
-        total = self.progress + self.value + self.variance + self.epoch + self.new_levels
-        if math.isfinite(total) and min(self.progress, self.variance, self.epoch, self.new_levels) >= 0:
+        counts = self.epoch, self.new_levels, self.sensor
+        if math.isfinite(self.progress + self.value + self.variance + sum(counts)) and (
+            min(self.progress, self.variance, *counts) >= 0
+        ):
             return
-        for name in ("progress", "value", "variance", "epoch", "new_levels"):
+        for name in ("progress", "value", "variance", "epoch", "new_levels", "sensor"):
             number = getattr(self, name)
             if not math.isfinite(number):
                 raise ValueError(f"{name} must be finite, got {number}")

@@ -57,7 +57,7 @@ def merged(history: History, prior: TrackPrior) -> History:
         return history
     order = np.argsort(history.progress, kind="stable")
     progress, value, variance = history.progress[order], history.value[order], history.variance[order]
-    epoch, levels = history.epoch[order], history.new_levels[order]
+    epoch, levels, sensor = history.epoch[order], history.new_levels[order], history.sensor[order]
     scatter, apart, certain = judged(value, variance, epoch, prior)
     variance = variance + np.where(certain, (prior.outlying_size * prior.size) ** 2, 0.0)
     weight = 1.0 / (variance + scatter)
@@ -86,6 +86,7 @@ def merged(history: History, prior: TrackPrior) -> History:
         "variance": np.where(alone, variance[first], np.maximum(usual, variance.min())),
         "epoch": epoch[first],
         "new_levels": levels[first],
+        "sensor": sensor[first],
         "count": bins.count,
         "within": np.where(alone, 0.0, bins.sum(np.square(weight) * left) * np.square(bins.count / bins.total)),
     }

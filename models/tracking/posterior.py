@@ -83,6 +83,13 @@ class TrackPosterior:
         """The sample as coefficients of eq. 6, each [n]."""
         return DegradationLaw(initial=self.initial, change=self.change, scale=self.scale, exponent=self.exponent)
 
+    @property
+    def of_clutch(self) -> "TrackPosterior":
+        """The sample of what the clutch does: without what a zeroed sensor adds to the readings."""
+        if self.discrepancy is None or (clutch := self.discrepancy.of_clutch) is self.discrepancy:
+            return self
+        return replace(self, discrepancy=clutch)
+
     def values(self, progress: FloatArray) -> FloatArray:
         """ξ at progress ζ >= 0 [k], or [k, n] where draws differ, discrepancy and all; [k, n]."""
         discrepancy, zeta = self.discrepancy, progress if progress.ndim == 2 else progress[:, None]
@@ -176,7 +183,7 @@ def _joined(columns: Sequence[Any]) -> Any:
     first = columns[0]
     if isinstance(first, CourseDiscrepancy):
         rows = {name: np.concatenate([getattr(column, name) for column in columns]) for name in BY_DRAW}
-        return CourseDiscrepancy(span=first.span, at=first.at, **rows)
+        return CourseDiscrepancy(span=first.span, at=first.at, of_readings=first.of_readings, **rows)
     return None if first is None else np.concatenate(columns)
 
 

@@ -23,9 +23,9 @@ class TrackPrior:
     `outlying_share` of the runs are off by a further normal of deviation `outlying_size`, `law_share` is the probability
     that there is no discrepancy beside eq. 6, `eq_6_share` that the course is that of eq. 6, `proportional_share` that the
     scatter is a share of the value (s then is that of a value of `size`), `step_size` the deviation of the level's shift at
-    an event; both sizes are shares of `size`. `knee_probability` is that of a knee ahead (`discrepancy`).
-    Raises ValueError where a number is not finite, a deviation or size not positive, or a share or probability out of its
-    range.
+    an event; both sizes are shares of `size`. `knee_hazard` is that of a knee per e-fold of progress (`discrepancy`).
+    Raises ValueError where a number is not finite, a deviation or size not positive, a share not within [0, 1) or a hazard
+    negative.
     """
 
     initial_mean: float
@@ -44,7 +44,7 @@ class TrackPrior:
     step_size: float = criteria.STEP_SIZE
     eq_6_share: float = 1.0
     proportional_share: float = 0.0
-    knee_probability: float = 0.0
+    knee_hazard: float = 0.0
 
     def __post_init__(self) -> None:
         for field in fields(self):
@@ -56,8 +56,8 @@ class TrackPrior:
         for name in ("outlying_share", "proportional_share"):
             if not 0.0 <= getattr(self, name) < 1.0:
                 raise ValueError(f"{name} must lie within [0, 1), got {getattr(self, name)}")
-        if not 0.0 <= self.knee_probability <= 1.0:
-            raise ValueError(f"knee_probability must lie within [0, 1], got {self.knee_probability}")
+        if self.knee_hazard < 0.0:
+            raise ValueError(f"knee_hazard must not be negative, got {self.knee_hazard}")
         for name in ("law_share", "eq_6_share"):
             if not 0.0 < getattr(self, name) <= 1.0:
                 raise ValueError(f"{name} must lie within (0, 1], got {getattr(self, name)}")
@@ -119,5 +119,5 @@ def weak(first: Measurement, *, falling: bool) -> TrackPrior:
         log_scatter_sd=0.8,
         eq_6_share=criteria.EQ_6_SHARE if falling else 1.0,
         proportional_share=criteria.PROPORTIONAL_SHARE if falling else 0.0,
-        knee_probability=criteria.KNEE_PROBABILITY if falling else 0.0,
+        knee_hazard=criteria.KNEE_HAZARD if falling else 0.0,
     )

@@ -362,18 +362,19 @@ def _store(
 
 def _event_of(arrival: Arrival) -> timeline.Event:
     run = arrival.run
+    moment, dated = timeline.moment_of(run.started_at, arrival.received_at)
     duty = run.details.get("duty") or {}
     names = ("cycles", "energy_per_cycle_kj", "initial_speed_rpm", "engagement_duration_s")
     return timeline.Event(
         run_id=run.run_id,
         kind=run.kind,
         cycles=run.cycles,
-        moment=timeline.moment_of(run.started_at, arrival.received_at),
+        moment=moment,
         speed_range=arrival.analysis.speed_range,
         oil_temperature=arrival.analysis.oil_temperature,
         **timeline.maintenance_fields(run.details.get("event"), run.details.get("reason")),
         duty=timeline.duty_block(run.cycles, *(duty.get(name) for name in names)),
-        dated=run.started_at is not None,
+        dated=dated,
         shown=arrival.shown,
     )
 

@@ -99,6 +99,12 @@ class Assumptions:
             return {WEAK: weak(first, falling=quantity == MEAN_COF)}
         return {WEAK: weak(first, falling=True), FLEET: fleet.in_unit(scale.severity.unit).prior_for(first)}
 
+    def weighted_priors(self, quantity: str, first: Measurement, scale: Scale) -> tuple[tuple[float, TrackPrior], ...]:
+        """The priors of a series, each with its share."""
+        priors, fleet = self.priors(quantity, first, scale), self.prior.fleet
+        share = 0.0 if fleet is None or FLEET not in priors else fleet.share
+        return tuple((share if name == FLEET else 1.0 - share, prior) for name, prior in priors.items())
+
     def pooled(self, posteriors: Mapping[str, TrackPosterior], first: Measurement, scale: Scale) -> TrackPosterior:
         """The posteriors under each of `priors` as one, weighted by their evidence."""
         fleet = self.prior.fleet

@@ -261,6 +261,9 @@ def _action(name: str, summary: Mapping[str, Any], soon: str, diagnosis: LatestD
     held = summary.get("held", 0)
     if summary.get("ended") and not held:
         return "Its life has ended: record the rebuild, or archive it."
+    if name in (FAILURE, MAINTENANCE) and not summary.get("ended") and (question := summary.get("rig_question")):
+        how = "run the diagnosis" if diagnosis is None else "see the diagnosis"
+        return f"Check the measurement before you replace anything: {question}, which a rig may do too; {how}."
     if name == FAILURE:
         unseen = summary["status"] == REACHED and untested_since(summary) is not None
         return "Run a stationary test, or replace the clutch." if unseen else "Replace the clutch."

@@ -20,6 +20,12 @@ OTHER_OIL = 10.0
 MIN_TORQUE_SD = 1e-4
 #: Pressure levels of one test [-]; more is a continuous pressure and no stationary test. Chosen: above any known protocol.
 MAX_LEVELS = 100
+#: Mean COFs at two pressures whose ratio has changed by more than this since the first test [-] are a question to the rig.
+#: Chosen: of 14 simulated lives it changes by up to 0.06 until COF has halved, by a gauge that is 0.4 bar off by 0.11.
+LEVELS_APART = 0.1
+#: The earliest date that is believed [s since 1970], and how far a rig's clock may be ahead of the service's [s]. Chosen:
+#: clocks that have lost the time begin at 1904, 1970, 1980 or 2000; time zones that were left out are at most 14 hours.
+EARLIEST, CLOCKS_APART = 978_307_200.0, 86_400.0
 #: Weighted draws of eq. 6's coefficients behind a stored prediction [-]. Chosen: `make score PARTS=exact`.
 PREDICTION_DRAWS = 1000
 #: Particles of a filter at least, however many draws of an adopted model they are shared among [-]. Chosen; no table: the

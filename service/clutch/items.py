@@ -1,6 +1,7 @@
 """Receipts and predictions as JSON, in the names and units of the API."""
 
 from collections.abc import Mapping, Sequence
+from datetime import datetime
 from typing import Final
 
 from models.friction.identification import StribeckFit
@@ -14,7 +15,7 @@ from service.clutch.analysis import Analysis, LevelFit, Value
 from service.clutch.assumptions import ALL_PRESSURES, MEAN_COF, Assumptions, severity_name
 from service.clutch.engagements import engagement_item
 from service.clutch.incoming_run import IncomingRun
-from service.clutch.timeline import WORN, ByPressure, Event
+from service.clutch.timeline import WORN, ByPressure, Event, is_possible
 from service.errors import Notice
 from service.settings import CODE_VERSION
 
@@ -54,7 +55,7 @@ def receipt(
         content_sha256=run.content_sha256,
         duplicate=False,
         file=ReceivedFile(**{name: file[name] for name in ReceivedFile.model_fields}) if file else None,
-        warnings=[*warnings_of_file(run), *warned(analysis.warnings)],
+        warnings=[*warnings_of_file(run), *warned([*date_notice(run.started_at, received_at), *analysis.warnings])],
         fits=fit_items(analysis.fits, cofs or {}),
         loops=loop_items(loops),
         engagement=None if analysis.engagement is None else engagement_item(analysis.engagement),
@@ -64,6 +65,19 @@ def receipt(
         note=run.details.get("note"),
         code_version=CODE_VERSION,
     )
+
+
+def date_notice(started_at: str | None, received_at: str) -> list[Notice]:
+    """The warning of a date that cannot be."""
+    if started_at is None or is_possible(started_at, received_at):
+        return []
+    started, received = (datetime.fromisoformat(each).timestamp() for each in (started_at, received_at))
+    odd = f"is in the future, after the run was received at {received_at}" if started > received else "is too early"
+    message = (
+        f"the date (started_at) {started_at} {odd}. The run counts as if it had none, and takes no part in the pace: set "
+        "the rig's clock"
+    )
+    return [Notice(code="date_not_possible", message=message)]
 
 
 def fit_items(levels: Sequence[LevelFit], cofs: ByPressure) -> list[Fit]:

@@ -8,10 +8,6 @@ from models.prognosis.course_shares import CourseName, CourseProbability
 from models.prognosis.criteria import HORIZON
 from models.prognosis.stated_end import NewLater
 from models.tracking.criteria import FAR
-from models.tracking.innovation import last_innovation
-from models.tracking.measurement import Measurement
-from models.tracking.posterior import TrackPosterior
-from models.tracking.prior import TrackPrior
 from service.api.life import LifePrediction
 from service.api.run import Evaluation, Warned
 from service.channels import ZERO_CELSIUS, bar
@@ -94,15 +90,15 @@ def interval_in_words(remaining: Mapping[str, float | None]) -> str:
     return f"{median:,.0f} (90 %: {low:,.0f} to {upper})"
 
 
-def off_track(posterior: TrackPosterior, measurements: Sequence[Measurement], prior: TrackPrior) -> list[Notice]:
-    """The warning of a last test that lies far off what the tests before it predict, and no event lies between."""
-    deviations = last_innovation(posterior, measurements, prior)
-    if deviations is None or not abs(deviations) > FAR:
+def off_track(back_cast: BackCast, value: float) -> list[Notice]:
+    """The warning of a last test of this value that lies far off what the tests before it predicted."""
+    deviations = float(back_cast.innovation[0]) if back_cast.innovation.size else 0.0
+    if not abs(deviations) > FAR:
         return []
     side = "below" if deviations < 0 else "above"
     size = f"{abs(deviations):.1f}" if math.isfinite(deviations) else "very many"
     message = (
-        f"the last test's mean COF of {measurements[-1].value:.4g} is {size} standard deviations {side} its prediction from "
+        f"the last test's mean COF of {value:.4g} is {size} standard deviations {side} its prediction from "
         "the earlier tests. Repeat the test: if the value stays, the clutch has changed"
     )
     return [Notice(code=OFF_TRACK, message=message)]

@@ -24,10 +24,10 @@ from models.records.criteria import LEVEL_GAP, LEVEL_GAP_SHARE
 from models.tracking.measurement import Measurement
 from models.tracking.prior import TrackPrior
 from service.api.run import EndReason
-from service.channels import RADIANS_PER_SECOND_PER_RPM
+from service.channels import RADIANS_PER_SECOND_PER_RPM, bar
 from service.clutch.analysis import Value
 from service.clutch.assumptions import ALL_PRESSURES, MEAN_COF, Assumptions, Scale
-from service.clutch.criteria import OTHER_OIL
+from service.clutch.criteria import CLOCKS_APART, EARLIEST, LEVELS_APART, OTHER_OIL
 from service.errors import LifeEndedError
 
 ByPressure = Mapping[float, Value]
@@ -36,7 +36,7 @@ Corrected = Mapping[float, tuple[float, float, tuple[float, ...]]]
 
 #: Kinds of runs.
 STATIONARY, DYNAMIC, MAINTENANCE = "stationary_stribeck", "dynamic_stribeck", "maintenance"
-REBUILD, END_OF_LIFE = "rebuild", "end_of_life"
+REBUILD, END_OF_LIFE, SENSOR_ZERO = "rebuild", "end_of_life", "sensor_zero"
 #: Why a life was declared ended: it is worn, or it was taken out before its end, which is later then.
 WORN = "worn"
 #: The first and the last moment that have a date [s since 1970].
@@ -71,9 +71,9 @@ class Event:
     `moment` is when it was made [s], `dated` whether the rig said so, `arrived` its place in the order of arrival, infinite
     while it comes in. A stationary test has the range of its speeds [rad/s], its mean oil temperature [K], and mean COF with
     its deviation by pressure [Pa] where its curves determine it, and `under` each draw of the model in force where that
-    corrects it; `duty` is the block that ends with the run, `shift` an event that may have shifted the level, `end` why the
-    life was declared ended with it; `shown` what its rows show (None: a channel is dead, so that no other run bears on
-    whether it is held), `confirmed` whether somebody confirmed it.
+    corrects it; `duty` is the block that ends with the run, `shift` an event that may have shifted the level, of the
+    readings alone where it `zeroes_sensor`, `end` why the life was declared ended with it; `shown` what its rows show (None:
+    a channel is dead, so that no other run bears on whether it is held), `confirmed` whether somebody confirmed it.
     """
 
     run_id: str
@@ -86,6 +86,7 @@ class Event:
     cofs: ByPressure = field(default_factory=dict)
     rebuild: bool = False
     shift: bool = False
+    zeroes_sensor: bool = False
     end: EndReason | None = None
     duty: Block | None = None
     dated: bool = False
@@ -96,12 +97,19 @@ class Event:
     _pooled: list[Any] = field(default_factory=list, init=False, repr=False, compare=False)
     _measured: list[Any] = field(default_factory=list, init=False, repr=False, compare=False)
 
-    def measured(self, progress: float, value: float, sd: float, epoch: int, new_levels: int) -> Measurement:
+    def measured(
+        self, progress: float, value: float, sd: float, epoch: int, new_levels: int, sensor: int
+    ) -> Measurement:
         """A measurement of mean COF over the pressures with these numbers, kept for the last ones."""
-        numbers = (progress, value, sd, epoch, new_levels)
+        numbers = (progress, value, sd, epoch, new_levels, sensor)
         if not self._measured or self._measured[0] != numbers:
             measurement = Measurement(
-                progress=progress, value=value, variance=sd**2, epoch=epoch, new_levels=new_levels
+                progress=progress,
+                value=value,
+                variance=sd**2,
+                epoch=epoch,
+                new_levels=new_levels,
+                sensor=sensor,
             )
             self._measured[:] = [numbers, measurement]
         made: Measurement = self._measured[1]
@@ -218,6 +226,18 @@ class Life:
             return False
         return abs(event.oil_temperature - reference) > OTHER_OIL
 
+    def rig_question(self, new_levels: Sequence[float]) -> str | None:
+        """What a change of the rig would explain as well as one of the clutch, as a clause: a step that no event explains,
+        at the cycles `new_levels`, or mean COFs whose ratios between pressures are not those of the reference test."""
+        if new_levels:
+            return f"mean COF stepped at {new_levels[-1]:,.0f} cycles and no maintenance was sent"
+        last = next((event.cofs for event in reversed(self.events) if event.cofs), {})
+        over = {level: cof[0] / self.reference[level][0] for level, cof in last.items() if level in self.reference}
+        if not over or min(over.values()) <= 0.0 or max(over.values()) / min(over.values()) < 1.0 + LEVELS_APART:
+            return None
+        high, low = (bar(pick(over, key=over.__getitem__)) for pick in (max, min))
+        return f"mean COF at {high:g} bar has risen against that at {low:g} bar"
+
     def _unexplained(self, tests: Sequence[Event]) -> Iterator[float]:
         """The cycles of those tests that begin a new level while no event lies between them and the test before."""
         shifts = [event.cycles for event in self.events if event.shift]
@@ -309,15 +329,21 @@ class Life:
         course = assumptions.offset(quantity, pressure, cycles)
         epochs = list(itertools.accumulate(int(event.shift or event.new_level) for event in self.events))
         levels = list(itertools.accumulate(int(event.new_level) for event in self.events))
+        zeroed = list(itertools.accumulate(int(event.zeroes_sensor) for event in self.events))
         places = zip(measured, scale.progress(cycles).tolist(), course.tolist(), strict=True)
         return Series(
             quantity=quantity,
             pressure=pressure,
             measurements=tuple(
-                self.events[index].measured(at, value - off, sd, epochs[index], levels[index])
+                self.events[index].measured(at, value - off, sd, epochs[index], levels[index], zeroed[index])
                 if pressure == ALL_PRESSURES
                 else Measurement(
-                    progress=at, value=value - off, variance=sd**2, epoch=epochs[index], new_levels=levels[index]
+                    progress=at,
+                    value=value - off,
+                    variance=sd**2,
+                    epoch=epochs[index],
+                    new_levels=levels[index],
+                    sensor=zeroed[index],
                 )
                 for (index, (value, sd)), at, off in places
             ),
@@ -360,6 +386,7 @@ class MaintenanceFields(TypedDict):
 
     rebuild: bool
     shift: bool
+    zeroes_sensor: bool
     end: EndReason | None
 
 
@@ -368,6 +395,7 @@ def maintenance_fields(event: str | None, reason: str | None) -> MaintenanceFiel
     return {
         "rebuild": event == REBUILD,
         "shift": event not in (None, REBUILD, END_OF_LIFE),
+        "zeroes_sensor": event == SENSOR_ZERO,
         "end": cast("EndReason | None", reason) if event == END_OF_LIFE else None,
     }
 
@@ -459,9 +487,20 @@ def duty_block(
     )
 
 
-def moment_of(started_at: str | None, received_at: str) -> float:
-    """When a run was made [s since 1970]: when it was started, or received where the rig did not say."""
-    return datetime.fromisoformat(started_at or received_at).timestamp()
+def moment_of(started_at: str | None, received_at: str) -> tuple[float, bool]:
+    """When a run was made [s since 1970], and whether the rig said so: when it was started, or received where the rig
+    did not say or said what cannot be."""
+    received = datetime.fromisoformat(received_at).timestamp()
+    if started_at is None or not is_possible(started_at, received_at):
+        return received, False
+    return datetime.fromisoformat(started_at).timestamp(), True
+
+
+def is_possible(started_at: str, received_at: str) -> bool:
+    """Whether a run that was received then can have been started then: not before EARLIEST, nor more than CLOCKS_APART after
+    it was received."""
+    started, received = (datetime.fromisoformat(each) for each in (started_at, received_at))
+    return started.timestamp() >= EARLIEST and started.timestamp() <= received.timestamp() + CLOCKS_APART
 
 
 def pace_of(events: Sequence[Event]) -> float | None:

@@ -20,9 +20,11 @@ from models.prognosis.course_shares import course_shares
 from models.prognosis.criteria import FEWEST_TESTS
 from models.prognosis.first_passage import Offset, horizon_at, predict_first_passage
 from models.prognosis.stated_end import StatedEnd, stated_end
+from models.tracking.criteria import FEWEST_BEFORE
 from models.tracking.filters.grid import Grid, GridState
 from models.tracking.filters.particle import Particle, ParticleState
 from models.tracking.filters.ukf import Ukf, UkfState
+from models.tracking.innovation import next_innovation
 from models.tracking.measurement import Measurement
 from models.tracking.posterior import Tracker, TrackPosterior, mixture
 from models.tracking.prior import TrackPrior
@@ -32,7 +34,7 @@ from service.clutch import items, notices
 from service.clutch.assumptions import ALL_PRESSURES, WEAK, Assumptions
 from service.clutch.criteria import FEWEST_PARTICLES, PREDICTION_DRAWS
 from service.clutch.timeline import Event, Life, Series, lives_of, nearest_pressure
-from service.errors import NotFoundError, Notice
+from service.errors import NotFoundError
 
 FilterState = ParticleState | UkfState | GridState
 
@@ -77,7 +79,7 @@ class Tracked:
             for prior, state in self.states.items()
             for name, array in state.to_arrays().items()
         }
-        back_cast = {"forecasts": self.back_cast.forecasts, "misses": self.back_cast.misses}
+        back_cast = {name: getattr(self.back_cast, name) for name in ("forecasts", "misses", "innovation")}
         return named | {f"{_BACK_CAST}/{name}": array for name, array in back_cast.items()}
 
     @classmethod
@@ -110,12 +112,18 @@ def follow(
             series = so_far.pooled(series.assumptions)
         runs, tests = series.until(index), so_far.tests
         if runs:
-            states = {method: advance(method, series, states.get(method), runs) for method in CARRIED}
+            states = {method: _sampled(method, series, states.get(method), runs) for method in CARRIED}
         predictions = []
         for method in CARRIED:
             made = predict(method, series, states.get(method), cycles, fraction, tests=tests)
             predictions.append(TrackPrediction(cycles=cycles, method=method, prediction=items.ended(made, so_far.end)))
         yield states, predictions
+
+
+def _sampled(method: str, series: Series, tracked: Tracked | None, runs: int) -> Tracked:
+    """A filter carried on with the sample that is drawn of it, which the next test is compared with."""
+    tracked = advance(method, series, tracked, runs)
+    return replace(tracked, sample=drawn(method, series, tracked))
 
 
 def advance(
@@ -142,7 +150,10 @@ def advance(
             name: tracker.update(state, branches[name][1][step], step_rng(_purpose(method, name), series, step))
             for name, state in tracked.states.items()
         }
-        judged = tracked.back_cast.judged(measurement) if back_cast is None else back_cast
+        judged = back_cast
+        if judged is None:
+            innovation = _innovation(method, series, tracked) if step == runs - 1 else []
+            judged = replace(tracked.back_cast.judged(measurement), innovation=np.array(innovation, dtype=np.float64))
         tracked = Tracked(runs=step + 1, states=states, back_cast=judged)
         if back_cast is None and kept_after(step + 1):
             sample = drawn(method, series, tracked)
@@ -247,7 +258,7 @@ def predict(
     warnings = [
         *notices.left_out(tests, runs),
         *notices.new_level([at for at in series.new_levels if at <= cycles]),
-        *_off_track(sample, series, runs),
+        *notices.off_track(tracked.back_cast, series.measurements[runs - 1].value),
     ]
     known = {
         "runs_used": runs,
@@ -293,16 +304,17 @@ def predict(
     return answer.model_copy(update=predicted)
 
 
-def _off_track(sample: TrackPosterior, series: Series, runs: int) -> list[Notice]:
-    """The warning of a last test that lies far off under every draw of the model in force, by the first of them."""
-    first: list[Notice] = []
+def _innovation(method: str, series: Series, tracked: Tracked) -> list[float]:
+    """The innovation of the next test, the least of those under the draws of the model in force; [] where there is none."""
+    runs = tracked.runs
+    if runs < FEWEST_BEFORE:
+        return []
+    sample, found = drawn(method, series, tracked), []
     for draw, (_, measurements) in enumerate(series.weighted):
         prior = series.priors(measurements[0])[WEAK]
-        warnings = notices.off_track(sample.of_branch(draw), measurements[:runs], prior)
-        if not warnings:
-            return []
-        first = first or warnings
-    return first
+        found.append(next_innovation(sample.of_branch(draw), measurements[:runs], measurements[runs], prior))
+    known = [each for each in found if each is not None]
+    return [min(known, key=abs)] if len(known) == len(found) else []
 
 
 def end_of_life(
@@ -319,6 +331,7 @@ def end_of_life(
         powers=tracked.back_cast.widening,
         ended=series.assumptions.ended((series.quantity, series.pressure), fraction, series.scale),
         tests=series.measurements[: tracked.runs],
+        priors=series.assumptions.weighted_priors(series.quantity, series.measurements[0], series.scale),
     )
 
 

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from models.tracking.courses import log_form_weight
+from models.tracking.criteria import KNEE_REACH
 from models.tracking.filters.grid import Grid
 from models.tracking.measurement import Measurement
 from models.tracking.prior import TrackPrior, weak
@@ -18,14 +19,14 @@ from tests.statistical.lives import PRIOR, STAGES, ends, lives, upto
 
 LAID, DRAWS, END, GRID = 0.4, 2_000, 10_000.0, Grid()
 BELIEFS = (0.3, 0.5, 0.55, 0.6, 0.7, 0.8, 0.9, 1.0)
-CHANCES = (0.0, 0.15, 0.3, 0.6, 1.0)
-#: What of other laws is shown beside the probabilities of a knee, and one that goes six times as fast from 0.7 of a life on.
+HAZARDS = (0.0, 0.15, 0.3, 0.6, 1.0)
+#: What of other laws is shown beside the hazards, and one that goes six times as fast from 0.7 of a life on.
 KNEE = "a knee at 0.7 of a life"
 BESIDE = ("logarithm", "accelerating (n = -1)", "exponential growth", KNEE)
 
 #: A prior, the tests seen at each stage, the end.
 Case = tuple[TrackPrior, list[list[Measurement]], float, np.random.Generator]
-#: Beliefs or probabilities of a knee, each with the ends of the draws and their weights.
+#: Beliefs or hazards, each with the ends of the draws and their weights.
 Weighed = Iterator[tuple[float, np.ndarray, np.ndarray]]
 
 
@@ -52,22 +53,22 @@ def belief(count: int, seed: int) -> str:
 
 
 def knees(count: int, seed: int) -> str:
-    """By probability of a knee: how often the interval holds the truth, its width and CRPS of the end's logarithm over those
+    """By hazard of a knee: how often the interval holds the truth, its width and CRPS of the end's logarithm over those
     without knees; of other laws how many intervals hold the truth and begin after it."""
     few = max(8, count // 8)
-    eq_6, *others = _scored(_by_chance, count, few, BESIDE, seed)
+    eq_6, *others = _scored(_by_hazard, count, few, BESIDE, seed)
     rows = (
         (
-            f"{chance:g}",
-            percents(eq_6.means(chance, "held")),
-            *_over(eq_6, chance, 0.0),
-            *(f"{percents(other.means(chance, 'held'))}; {percents(other.means(chance, 'late'))}" for other in others),
+            f"{hazard:g}",
+            percents(eq_6.means(hazard, "held")),
+            *_over(eq_6, hazard, 0.0),
+            *(f"{percents(other.means(hazard, 'held'))}; {percents(other.means(hazard, 'late'))}" for other in others),
         )
-        for chance in CHANCES
+        for hazard in HAZARDS
     )
     return written(
         f"{count} lives of eq. 6, {few} of each other law, seed {seed}; at 20/40/60/80 % of life",
-        "probability of a knee | eq. 6: held, % | width over that without | CRPS over that without | "
+        "hazard per e-fold | eq. 6: held, % | width over that without | CRPS over that without | "
         + " | ".join(f"{name}: held; begins after it, %" for name in BESIDE),
         rows,
     )
@@ -96,12 +97,17 @@ def _scored(
         yield scores
 
 
-def _by_chance(prior: TrackPrior, seen: list[Measurement], rng: np.random.Generator) -> Weighed:
-    laid = GRID.posterior(GRID.from_history(replace(prior, knee_probability=1.0), seen), DRAWS, rng)
-    beside, sure = laid.discrepancy, rng.random(laid.weight.size)
-    for chance in CHANCES:
-        knee = np.where(sure < chance, beside.knee, np.inf)
-        yield chance, ends(replace(laid, discrepancy=replace(beside, knee=knee))), laid.weight
+def _by_hazard(prior: TrackPrior, seen: list[Measurement], rng: np.random.Generator) -> Weighed:
+    laid = GRID.posterior(GRID.from_history(replace(prior, knee_hazard=1.0), seen), DRAWS, rng)
+    beside = laid.discrepancy
+    for hazard in HAZARDS:
+        # a knee of hazard 1 at T e^x is one of hazard h at T e^(x/h)
+        knee = np.full(laid.weight.size, np.inf)
+        if hazard > 0.0:
+            with np.errstate(over="ignore"):
+                knee = beside.span * (beside.knee / beside.span) ** (1.0 / hazard)
+        knee[(beside.size == 0.0) & (knee > KNEE_REACH * beside.span)] = np.inf
+        yield hazard, ends(replace(laid, discrepancy=replace(beside, knee=knee))), laid.weight
 
 
 def _by_belief(prior: TrackPrior, seen: list[Measurement], rng: np.random.Generator) -> Weighed:

@@ -10,7 +10,7 @@ import numpy as np
 from models.prognosis.first_passage import ends_of_life, predict_first_passage
 from models.rig.truth import draw
 from models.tracking.courses import FORM_COURSE, FORM_PROPORTIONAL, FORM_SIZE, coefficients_at, log_form_weight
-from models.tracking.criteria import KNEE_PACE, KNEE_PROBABILITY, LOG_KNEE_PACE_SD, UNSEEN_WEAR
+from models.tracking.criteria import KNEE_HAZARD, KNEE_PACE, KNEE_REACH, LOG_KNEE_PACE_SD, UNSEEN_WEAR
 from models.tracking.discrepancy import FUTURE, PAST, CourseDiscrepancy
 from models.tracking.filters.grid import Grid
 from models.tracking.measurement import Measurement
@@ -105,14 +105,15 @@ def stated(count: int, seed: int, *, whole: bool) -> tuple[np.ndarray, np.ndarra
             truth = replace(truth, scale=scale, exponent=exponent)
             course = size * PRIOR.size * rng.standard_normal((1, PAST + FUTURE))
             unworn = truth.initial[0] - truth.values(np.array([last]))[0, 0] < UNSEEN_WEAR * truth.initial[0]
-            knee = (size > 0.0 or unworn) and rng.random() < KNEE_PROBABILITY
+            times = (1.0 - rng.random()) ** (-1.0 / KNEE_HAZARD)
+            knee = size > 0.0 or (unworn and times < KNEE_REACH)
             beside = CourseDiscrepancy(
                 span=last,
                 size=np.full(1, size),
                 curvature=course,
                 at=np.zeros(0),
                 height=np.zeros((1, 0)),
-                knee=np.full(1, last / (1.0 - rng.random()) if knee else np.inf),
+                knee=np.full(1, last * times if knee else np.inf),
                 steepening=KNEE_PACE * np.exp(LOG_KNEE_PACE_SD * rng.standard_normal(1)),
             )
             truth = replace(truth, discrepancy=beside)

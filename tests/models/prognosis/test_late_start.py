@@ -14,7 +14,7 @@ from models.prognosis.stated_end import StatedEnd, late_start, stated_end
 from models.tracking.courses import FORM_COURSE, FORM_SIZE, SCALE_SIGN, log_form_weight
 from models.tracking.linear_model import EvaluationPoints
 from models.tracking.measurement import Measurement
-from models.tracking.prior import weak
+from models.tracking.prior import TrackPrior, weak
 from tests import dense
 from tests.models.tracking.tracked_series import on_grid, sent
 
@@ -120,3 +120,21 @@ def log_evidence(tests: list[Measurement], count: int = 60_000) -> float:
     log_likelihood = dense.log_likelihood(prior, tests, points)
     ended = (SCALE_SIGN[FORM_COURSE[points.form]] < 0.0) & (np.exp(points.log_scale) <= tests[-1].progress)
     return float(np.log(np.where(ended, 0.0, np.exp(log_likelihood)).mean()))
+
+
+def test_a_fleets_prior_has_a_word_in_whether_it_was_new_later() -> None:
+    """The same prior twice is that prior once. A fleet that ages as the clutch does makes it more probable than one whose
+    clutches change within some 200 cycles."""
+    tests = elsewhere(4.0)
+    prior = weak(tests[0], falling=True)
+
+    def log_odds(*priors: TrackPrior) -> float:
+        shared = tuple((1.0 / len(priors), each) for each in priors)
+        return late_start(tests, 0.5, offset=None, horizon=1e6, priors=shared).log_odds
+
+    alone = late_start(tests, 0.5, offset=None, horizon=1e6).log_odds
+    assert log_odds(prior) == pytest.approx(alone, abs=1e-9)
+    assert log_odds(prior, prior) == pytest.approx(alone, abs=1e-9)
+    alike = replace(prior, log_scale_mean=math.log(10_000.0), log_scale_sd=0.3, change_mean=-0.1, change_sd=0.02)
+    short = replace(alike, log_scale_mean=math.log(200.0))
+    assert log_odds(alike) > log_odds(alike, short) > log_odds(short)

@@ -1,6 +1,5 @@
 """Courses and their knees, the model's discrepancy, both as one linear model, priors and draws."""
 
-import itertools
 import math
 from dataclasses import asdict, fields, replace
 from typing import Any
@@ -14,7 +13,7 @@ from models.degradation.general_order import first_passage, progress_fraction
 from models.prognosis.first_passage import ends_of_life, predict_first_passage, weighted_quantiles
 from models.tracking import courses, linear_model, sampling
 from models.tracking.courses import CourseForm
-from models.tracking.criteria import KNEE_PROBABILITY, UNSEEN_WEAR
+from models.tracking.criteria import KNEE_HAZARD, KNEE_REACH, UNSEEN_WEAR
 from models.tracking.discrepancy import PAST, drawn, smooth
 from models.tracking.filters.grid import Grid
 from models.tracking.filters.particle import Particle
@@ -149,6 +148,28 @@ def test_after_an_event_the_forecast_widens_and_then_settles(tracker: Any) -> No
     assert step[1] < 0.3 * 0.06 * 0.134
 
 
+@pytest.mark.parametrize("tracker", [Grid(), Particle(), Ukf()], ids=NAMES)
+@pytest.mark.parametrize(("step", "last", "left"), [(0.02, 19_000.0, 1_000.0), (-0.02, 15_000.0, 5_000.0)])
+def test_a_zeroed_sensor_changes_the_readings_and_not_the_clutch(
+    tracker: Any, step: float, last: float, left: float
+) -> None:
+    """COF falls evenly to half at 20,000; from 7,500 on readings are off by a fifth. As an oil change the same step moves
+    the clutch: of the readings the end is too late or reached."""
+    at = np.arange(0.0, last + 1.0, 1_000.0)
+    values = 0.1 * (1.0 - 0.5 * at / 20_000.0) * (1.0 + 0.002 * np.random.default_rng(2).standard_normal(at.size))
+    after = at > 7_500.0
+    tests = sent(at, values + step * after, 1e-9, after)
+    zeroed = [replace(test, sensor=test.epoch) for test in tests]
+
+    def median(measurements: list[Measurement]) -> float:
+        state = followed(tracker, weak(measurements[0], falling=True), measurements)
+        posterior = tracker.posterior(state, 1_000, np.random.default_rng(1))
+        return predict_first_passage(posterior, fraction=0.5, as_of=last).end_of_life[0.5] - last
+
+    assert median(zeroed) == pytest.approx(left, rel=0.25)
+    assert median(tests) != pytest.approx(left, rel=0.25)
+
+
 def test_a_course_goes_on_along_its_knee_from_there_on() -> None:
     """From ζ = 1,500 on by four times the mean pace of wear until then, and a tenth of ξ0 counts as worn; before, nothing
     changes. One that rises stays from there on and falls by that tenth alone."""
@@ -165,7 +186,7 @@ def test_a_course_goes_on_along_its_knee_from_there_on() -> None:
     np.testing.assert_allclose(rising.values(at)[-1], [0.115 - fallen, 0.12], atol=1e-12)
 
 
-def test_knees_come_as_their_probability_has_it_and_eq_6_alone_has_none_once_it_wears() -> None:
+def test_knees_come_as_their_hazard_has_it_and_eq_6_alone_has_none_once_it_wears() -> None:
     prior = weak(Measurement(progress=0.0, value=0.1, variance=0.0), falling=True)
     history = History.of(sent([0.0, 2_000.0], 0.1), prior)
     sizes, worn = np.repeat([0.0, 0.0, 0.03], 20_000), np.repeat([0.2, 0.05, 0.2], 20_000)
@@ -175,9 +196,10 @@ def test_knees_come_as_their_probability_has_it_and_eq_6_alone_has_none_once_it_
 
     found = knees(history, prior)
     assert np.isinf(found[:20_000]).all()
-    for ahead, some in itertools.product((1.5, 3.0, 1e6), (found[20_000:40_000], found[40_000:])):
-        expected = KNEE_PROBABILITY * (1.0 - 1.0 / ahead)
-        assert (some <= ahead * 2_000.0).mean() == pytest.approx(expected, abs=0.015)
+    for ahead in (1.5, 3.0, 30.0):
+        for some, reach in ((found[20_000:40_000], KNEE_REACH), (found[40_000:], np.inf)):
+            expected = 1.0 - min(ahead, reach) ** -KNEE_HAZARD
+            assert (some <= ahead * 2_000.0).mean() == pytest.approx(expected, abs=0.015)
     assert found.min() >= 2_000.0
     # before a second test there is no scale that they could have
     assert np.isinf(knees(History.of(sent([0.0], 0.1), prior), prior)).all()

@@ -147,6 +147,7 @@ def test_tests_at_one_progress_merge_without_any_loss() -> None:
         variance=full.variance[::15],
         epoch=full.epoch[::15],
         new_levels=full.new_levels[::15],
+        sensor=full.sensor[::15],
         count=np.full(12, 15.0),
         within=np.bincount(of, np.square(full.value - level[of])),
     )

@@ -14,11 +14,11 @@ from models.tracking.criteria import FAR, FEWEST_BEFORE
 from models.tracking.filters import grid as grid_module
 from models.tracking.filters.grid import Grid
 from models.tracking.filters.particle import Particle
-from models.tracking.innovation import innovation, last_innovation
+from models.tracking.innovation import innovation, next_innovation
 from models.tracking.measurement import Measurement
 from models.tracking.posterior import TrackPosterior
 from models.tracking.prior import TrackPrior
-from tests.models.tracking.tracked_series import FILTERS, PLAIN, PRIOR, TYPICAL, followed, on_grid, series
+from tests.models.tracking.tracked_series import FILTERS, PLAIN, PRIOR, TYPICAL, followed, on_grid, sent, series
 
 # --- The standardised innovation against a filter that has not been given the last test at all.
 
@@ -46,27 +46,39 @@ def predicted(before: TrackPosterior, last: Measurement) -> float:
 @pytest.mark.parametrize("off", [-1.0, 0.0, 0.5, 1.0, 2.0, 3.0])
 def test_it_is_what_the_tests_before_predict(off: float) -> None:
     measurements = measured(off)
-    expected = predicted(drawn(measurements[:-1]), measurements[-1])
-    # 8,000 draws on either side, of which fewer carry the weight the farther off the test is
-    assert innovation(drawn(measurements), measurements[-1], PLAIN) == pytest.approx(expected, rel=0.08, abs=0.03)
+    before = drawn(measurements[:-1])
+    expected = predicted(before, measurements[-1])
+    assert innovation(before, measurements[-1], PLAIN) == pytest.approx(expected, rel=1e-6, abs=1e-6)
 
 
 def test_draws_that_know_the_last_test_are_less_surprised_by_it() -> None:
-    """The negative control: without the weights the innovation is too small."""
+    """The negative control: compared with what was updated by it, a test is too near."""
     measurements = measured(-3.0)
-    posterior = drawn(measurements)
-    assert innovation(posterior, measurements[-1], PLAIN) < predicted(posterior, measurements[-1]) - 1.0
+    before, after = drawn(measurements[:-1]), drawn(measurements)
+    assert innovation(before, measurements[-1], PLAIN) < innovation(after, measurements[-1], PLAIN) - 1.0
 
 
 def test_a_test_far_off_is_off_track_after_enough_tests_without_an_event() -> None:
-    far, good = measured(-60.0), measured(0.0)
-    assert last_innovation(drawn(far, PRIOR), far, PRIOR) < -FAR
-    assert abs(last_innovation(drawn(good, PRIOR), good, PRIOR)) <= FAR
+    """Above: a fall of that size is one that a knee may bring."""
+    far, good = measured(60.0), measured(0.0)
+    before, earlier = drawn(far[:-1], PRIOR), far[:-1]
+    assert next_innovation(before, earlier, far[-1], PRIOR) > FAR
+    assert -FAR < next_innovation(before, earlier, measured(-60.0)[-1], PRIOR) < -2.0
+    assert abs(next_innovation(before, earlier, good[-1], PRIOR)) <= FAR
     # nothing is off track after few tests or across an event
-    far = measured(-60.0)
-    posterior = drawn(far, PRIOR)
-    assert last_innovation(posterior, far[-FEWEST_BEFORE:], PRIOR) is None
-    assert last_innovation(posterior, [*far[:-1], replace(far[-1], epoch=1)], PRIOR) is None
+    assert next_innovation(before, earlier[: FEWEST_BEFORE - 1], far[-1], PRIOR) is None
+    assert next_innovation(before, earlier, replace(far[-1], epoch=1), PRIOR) is None
+
+
+def test_after_a_knee_that_may_have_come_a_test_is_not_off_track() -> None:
+    """A course with a discrepancy may have a knee between two tests: predicted before, it widens the prediction."""
+    at = np.linspace(0.0, 8_000.0, 9)
+    line = 0.1 * (1.0 - 0.4e-4 * at) * (1.0 + 0.004 * np.random.default_rng(1).standard_normal(at.size))
+    before = drawn(sent(at, line, 1e-9), PRIOR)
+    knee = before.discrepancy.knee
+    test = sent([12_000.0], [0.1 * (1.0 - 0.4e-4 * 12_000.0) - 0.008], 1e-9)[0]
+    without = replace(before, discrepancy=replace(before.discrepancy, knee=np.full(knee.size, np.inf)))
+    assert abs(innovation(before, test, PRIOR)) < abs(innovation(without, test, PRIOR)) - 0.5
 
 
 # --- Outlying runs are identified, alone and several at once, and widen the answer without turning it.

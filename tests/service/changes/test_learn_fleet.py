@@ -69,8 +69,7 @@ def url(tmp_path: Path) -> str:
 
 
 def width(said: dict[str, dict[str, float | None]]) -> float:
-    """Of the middle half: what lies beyond is mostly knees, of which a fleet teaches nothing."""
-    low, high = (said["end_of_life_cycles"][q] for q in ("0.25", "0.75"))
+    low, high = (said["end_of_life_cycles"][q] for q in ("0.1", "0.9"))
     return math.log((1e6 if high is None else high) / (1e6 if low is None else low))
 
 

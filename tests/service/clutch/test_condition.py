@@ -212,6 +212,19 @@ def advising(test: str, effect: str) -> LatestDiagnosis:
         (summary(900.0, pace=PACE), None, "Maintenance required: ", "Replace within less than a day at the pace so far"),
         (summary(0.4, pace=PACE), None, "Maintenance required: ", "Replace now."),
         (
+            summary(900.0, rig_question="mean COF stepped at 7,000 cycles"), None, "Maintenance required: ",
+            "Check the measurement before you replace anything: mean COF stepped at 7,000 cycles, which a rig may do too; "
+            "run the diagnosis.",
+        ),
+        (
+            summary(0.0, status="reached", rig_question="mean COF at 2 bar has risen"), found(["drag"]), "Failure: ",
+            "Check the measurement before you replace anything: mean COF at 2 bar has risen, which a rig may do too; see",
+        ),
+        (
+            summary(9000.0, rig_question="mean COF stepped at 7,000 cycles and no maintenance was sent"), None,
+            "Normal: ", "Nothing to do: carry on testing.",
+        ),
+        (
             summary(9450.0, status="may_never_reach", pace=PACE), None,
             "Normal: safe for 9,400 more cycles (95 %): 9 days at the pace so far, counted from the last run on "
             "1 Dec 2026; later tests will tell",

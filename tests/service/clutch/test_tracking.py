@@ -126,9 +126,9 @@ def test_draws_that_differ_nowhere_are_tracked_once() -> None:
 def test_a_test_is_odd_only_where_it_is_under_every_draw() -> None:
     of, under = life(*TAKEN), assumptions(*WEIGHTS)
     last = of.events[-1]
-    jumped = replace(last, under={p: (draws[0], 0.6 * draws[1]) for p, draws in last.under.items()})
+    jumped = replace(last, under={p: (draws[0], 1.6 * draws[1]) for p, draws in last.under.items()})
     odd_under_one = replace(of, events=(*of.events[:-1], jumped))
-    both = replace(of, events=(*of.events[:-1], replace(last, under=dict.fromkeys(LEVELS, (0.05, 0.04)))))
+    both = replace(of, events=(*of.events[:-1], replace(last, under=dict.fromkeys(LEVELS, (0.25, 0.24)))))
     warned = []
     for one in (of, odd_under_one, both):
         series = one.pooled(under)

@@ -15,7 +15,7 @@ from models.degradation.general_order import progress_fraction, value
 from models.prognosis.first_passage import PassageStatus, predict_first_passage, weighted_quantiles
 from models.tracking import linear_model
 from models.tracking.courses import FORM_COURSE, SCALE_SIGN, WITHOUT_EXPONENT, log_form_weight
-from models.tracking.criteria import COURSE_SHARES, EQ_6_SHARE, KNEE_PROBABILITY, PROPORTIONAL_SHARE
+from models.tracking.criteria import COURSE_SHARES, EQ_6_SHARE, KNEE_HAZARD, PROPORTIONAL_SHARE
 from models.tracking.filters import ukf
 from models.tracking.filters.grid import Grid
 from models.tracking.filters.particle import Particle
@@ -69,7 +69,7 @@ def test_a_seed_gives_the_same_answer_twice_from_stored_arrays_too(tracker: Any)
     arrays = state.to_arrays()
     assert arrays.keys() == STORED_NAMES[tracker.name]
     # in the order of the fields of TrackPrior, of which 0.05 is the share of outlying runs and 0.1 their size
-    assert arrays["prior"].tolist()[10:] == [0.05, 0.1, 0.95, 0.05, EQ_6_SHARE, PROPORTIONAL_SHARE, KNEE_PROBABILITY]
+    assert arrays["prior"].tolist()[10:] == [0.05, 0.1, 0.95, 0.05, EQ_6_SHARE, PROPORTIONAL_SHARE, KNEE_HAZARD]
     flags = ["outlying"] if tracker.name == "particle" else []
     assert [name for name, column in arrays.items() if column.dtype == np.bool_] == flags
     assert all(column.dtype == np.float64 for name, column in arrays.items() if name not in flags)
@@ -98,7 +98,7 @@ def test_particle_and_grid_agree_on_the_coefficients() -> None:
         assert abs(particle - grid) < 0.2 * sd, name
 
 
-SERIES = {"prior", "progress", "value", "variance", "epoch", "new_levels"}
+SERIES = {"prior", "progress", "value", "variance", "epoch", "new_levels", "sensor"}
 STORED_NAMES = {
     "grid": SERIES,
     "particle": SERIES | {"points", "form", "outlying", "log_weight", "log_target"},
