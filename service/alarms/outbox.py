@@ -11,7 +11,7 @@ and it alone goes by the wall clock to tell for how long rigs have been silent.
 import logging
 import threading
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -101,9 +101,11 @@ class Outbox:
                 self._woken = False
 
     def _deliver(self) -> None:
+        with self._change:
+            busy = frozenset(self._busy)
         with self._database.reading() as connection:
             waiting = webhooks.next_ones(connection)
-        due = self._due(waiting)
+        due = self._due(waiting, busy)
         if not due:
             return
         with self._database.writing(of="outbox") as connection:
@@ -120,19 +122,19 @@ class Outbox:
                     self._busy.add(row.webhook_id)
                 self._pool.submit(self._attempt, row, receiver, private=private)
 
-    def _due(self, waiting: Sequence[WaitingRow]) -> list[WaitingRow]:
-        """Those that are to be tried now: one of each receiver, at most so many at once."""
+    def _due(self, waiting: Sequence[WaitingRow], busy: Collection[str]) -> list[WaitingRow]:
+        """Those that are to be tried now: one of each receiver, at most so many at once. An attempt to a receiver that was
+        `busy` when they were read may have ended since: what it has planned is kept."""
         now, due = time.monotonic(), dict[str, WaitingRow]()
         with self._change:
             known, self._planned = self._planned, {}
             for row in waiting:
                 seen = (row.attempts, row.last_attempt_at)
-                before = known.get(row.delivery_key)
-                planned = (
-                    before if before is not None and before[0] == seen else (seen, now + self._left_to_others(row))
-                )
+                planned = known.get(row.delivery_key)
+                if planned is None or (planned[0] != seen and row.webhook_id not in busy):
+                    planned = seen, now + self._left_to_others(row)
                 self._planned[row.delivery_key] = planned
-                if planned[1] <= now and row.webhook_id not in self._busy:
+                if planned[1] <= now and row.webhook_id not in busy:
                     due.setdefault(row.webhook_id, row)
             return list(due.values())[: _AT_ONCE - len(self._busy)]
 

@@ -34,9 +34,9 @@ class Receiver:
     def bodies(self) -> list[dict[str, Any]]:
         return [json.loads(body) for _, _, body in self.requests]
 
-    def await_requests(self, count: int, seconds: float = 20.0) -> list[dict[str, Any]]:
+    def await_requests(self, count: int) -> list[dict[str, Any]]:
         """The bodies, once there are so many."""
-        until(lambda: len(self.requests) >= count, within=seconds)
+        until(lambda: len(self.requests) >= count, within=120)
         return self.bodies
 
 

@@ -123,7 +123,7 @@ def test_closing_ends_what_runs_at_once() -> None:
     threading.Timer(2.0, pool.close).start()
     with pytest.raises(RuntimeError, match="the executor is closed"):
         list(outcomes)
-    until(lambda: not any(child.is_alive() for child in multiprocessing.active_children()), within=30.0)
+    until(lambda: not any(child.is_alive() for child in multiprocessing.active_children()), within=120.0)
 
 
 def test_processes_end_with_the_one_that_started_them() -> None:
@@ -135,11 +135,11 @@ def test_processes_end_with_the_one_that_started_them() -> None:
         "print({outcome.result for outcome in pool.map(pid, range(8))}, flush=True)\n"
         "os.kill(os.getpid(), signal.SIGKILL)\n"
     )
-    done = subprocess.run([sys.executable, "-c", source], capture_output=True, text=True, timeout=120, cwd=ROOT)
+    done = subprocess.run([sys.executable, "-c", source], capture_output=True, text=True, timeout=600, cwd=ROOT)
     assert done.returncode == -signal.SIGKILL, done.stderr
     pids = [int(text) for text in done.stdout.strip().strip("{}").split(",")]
     assert pids
-    until(lambda: not any(Path(f"/proc/{each}").exists() for each in pids), within=30.0)
+    until(lambda: not any(Path(f"/proc/{each}").exists() for each in pids), within=120.0)
 
 
 def test_a_cluster_of_another_release_is_refused(dask_cluster: LocalCluster, monkeypatch: pytest.MonkeyPatch) -> None:

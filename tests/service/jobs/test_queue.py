@@ -115,7 +115,7 @@ def test_a_queue_that_is_woken_looks_at_once(in_file: Database, monkeypatch: pyt
         assert looked.wait(60.0)
         ask(in_file, "r", jobs.REPLAY)
         queue.wake()
-        until(lambda: states(in_file) == {"r": "failed"}, within=20.0)
+        until(lambda: states(in_file) == {"r": "failed"})
 
 
 def test_a_lease_ends_by_a_clock_that_nobody_sets(monkeypatch: pytest.MonkeyPatch) -> None:
