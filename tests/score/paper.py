@@ -15,8 +15,9 @@ from models.rig.sampled import DynamicTest, sampled_test
 from models.rig.stationary import Sensor, stationary_test
 from models.rig.truth import PROTOCOL_PRESSURES, SimulatedClutch, draw
 from service.api.life import CriterionIn
+from service.api.run import Evaluation
 from service.channels import RADIANS_PER_SECOND_PER_RPM
-from service.clutch.analysis import levels_of, mean_cofs
+from service.clutch.analysis import LevelFit, levels_of, mean_cofs
 from service.clutch.assumptions import Assumptions
 from service.clutch.criteria import SEVERITY_EXPONENTS
 from service.clutch.items import loop_items
@@ -41,7 +42,7 @@ def measured_life(
 ) -> MeasuredLife:
     """A life with a stationary test, and a dynamic one where it is given, at each of `cycles`."""
     events: list[Event] = []
-    levels, receipts = {}, {}
+    levels, receipts = dict[str, list[LevelFit]](), dict[str, Evaluation]()
     for index, at in enumerate(cycles):
         plateaus = stationary_test(clutch, at, rng)
         fitted = levels_of(plateaus, clutch.geometry)
@@ -54,7 +55,7 @@ def measured_life(
             record = sampled_test(clutch, at, dynamic, rng, Sensor())
             fit = fitted[PLACE].fit
             loops = evaluate_loops(record, clutch.geometry, {fit.pressure: StationaryCurve.of(fit)})
-            receipts[f"loops-{index}"] = {"loops": loop_items(loops)}
+            receipts[f"loops-{index}"] = Evaluation.model_construct(loops=loop_items(loops))
             events.append(Event(run_id=f"loops-{index}", kind=DYNAMIC, cycles=at, moment=2.0 * index + 1.0))
     return MeasuredLife(
         life=Life(origin=0.0, events=tuple(events)),
