@@ -211,6 +211,8 @@ def reseal(connection: Connection) -> None:
 def take_back(connection: Connection) -> None:
     """Bring a server's database to OLD, keeping what it holds."""
     connection.exec_driver_sql("ALTER TABLE clutch DROP COLUMN IF EXISTS later")
+    connection.exec_driver_sql("ALTER TABLE job DROP COLUMN IF EXISTS renewals")
+    connection.exec_driver_sql("ALTER TABLE job ADD COLUMN IF NOT EXISTS leased_until TEXT")
     for table in metadata.tables:
         connection.exec_driver_sql(f"ALTER TABLE {table} DROP COLUMN IF EXISTS checksum")
     connection.execute(text("UPDATE alembic_version SET version_num = :before"), {"before": OLD})
