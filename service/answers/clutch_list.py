@@ -8,7 +8,7 @@ from sqlalchemy import Connection
 
 from models.prognosis.criteria import HORIZON
 from service import repository
-from service.answers.cache import AnswerCache, to_json
+from service.answers.store import AnswerStore, to_json
 from service.api.base import of_row
 from service.api.clutch import ClutchOut, LatestDiagnosis
 from service.api.fleet import FleetTotals, StateCounts
@@ -43,7 +43,13 @@ def every(database: Database, *, at_once: int) -> Iterator[ClutchOut]:
 
 
 def page_as_json(
-    database: Database, cache: AnswerCache, choice: ClutchSelection, part: Part, *, offset: int = 0, sort: str = "worst"
+    database: Database,
+    answers: AnswerStore,
+    choice: ClutchSelection,
+    part: Part,
+    *,
+    offset: int = 0,
+    sort: str = "worst",
 ) -> bytes:
     """A page of the clutches of a choice; each one's item is made once for its revision and verdict. By kind, a page's place
     is how many clutches are before it."""
@@ -59,7 +65,7 @@ def page_as_json(
     def item(clutch: _Shown) -> bytes:
         row, _, diagnosis, _ = clutch
         version = (row.revision, row.state, None if diagnosis is None else to_json(diagnosis))
-        return cache.answer(("clutch", row.clutch_id), version, lambda: to_json(_item(clutch))).body
+        return answers.answer(("clutch", row.clutch_id), version, lambda: to_json(_item(clutch))).body
 
     places = {
         "worst": lambda row: (row.rank, row.clutch_id),
