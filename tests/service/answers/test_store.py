@@ -154,24 +154,24 @@ def test_no_number_leaves_that_json_cannot_carry() -> None:
 def test_of_several_services_on_a_server_one_computes(on_server: Database) -> None:
     computed: list[str] = []
 
-    def count(_: Database, clutch_id: str, *arguments: str) -> dict[str, int]:
+    def count(_: Database, clutch_id: str, *arguments: str) -> Named:
         computed.append(clutch_id)
-        return {"computed": len(computed), "arguments": len(arguments)}
+        return Named(name=f"{len(arguments)} arguments", value=len(computed))
 
     write_to(on_server, clutches.insert, clutch_row("c1"))
     with closing(open_database(on_server.url)) as other:
         assert shared_answer(other, count, "c1") is None
         first = revision_and_json(on_server, count, "c1", ())
-        assert first == (0, b'{"computed":1,"arguments":0}')
+        assert first == (0, b'{"name":"0 arguments","value":1}')
         assert revision_and_json(other, count, "c1", ()) == first
         assert shared_answer(other, count, "c1") == first
         with on_server.writing(of="c1") as connection:
             clutches.bump_revision(connection, "c1")
         assert shared_answer(other, count, "c1") == first
-        assert revision_and_json(other, count, "c1", ()) == (1, b'{"computed":2,"arguments":0}')
+        assert revision_and_json(other, count, "c1", ()) == (1, b'{"name":"0 arguments","value":2}')
         # with arguments, of which there are any number, nothing is kept
-        assert revision_and_json(on_server, count, "c1", ("ukf",)) == (1, b'{"computed":3,"arguments":1}')
-        assert revision_and_json(other, count, "c1", ("ukf",)) == (1, b'{"computed":4,"arguments":1}')
+        assert revision_and_json(on_server, count, "c1", ("ukf",)) == (1, b'{"name":"1 arguments","value":3}')
+        assert revision_and_json(other, count, "c1", ("ukf",)) == (1, b'{"name":"1 arguments","value":4}')
     assert len(computed) == 4
 
 
