@@ -176,8 +176,8 @@ def test_of_several_services_on_a_server_one_computes(on_server: Database) -> No
 
 
 def test_another_build_of_the_release_computes_for_itself(on_server: Database, monkeypatch: pytest.MonkeyPatch) -> None:
-    def query(_: Database, clutch_id: str) -> dict[str, str]:
-        return {"clutch_id": clutch_id, "computed_by": caches.BUILD}
+    def query(_: Database, clutch_id: str) -> Named:
+        return Named(name=f"{clutch_id} by {caches.BUILD}")
 
     write_to(on_server, clutches.insert, clutch_row("c1"))
     _, first = revision_and_json(on_server, query, "c1", ())
