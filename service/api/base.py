@@ -131,7 +131,7 @@ class Schema(BaseModel):
 class Answer(BaseModel):
     """Base of answers: a value that goes out as JSON in the order of its fields, without those that were not given."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, ser_json_inf_nan="constants")
 
 
 # --- in requests ---
