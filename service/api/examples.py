@@ -53,7 +53,8 @@ _SHARED: tuple[tuple[Any, str], ...] = (
 _OWN: dict[str, Any] = {
     "step": "reads the runs", "replayed": 39, "SeverityWeighed.basis": "dissipated_energy",
     "SeverityWeighed.exponents": [0.0, 0.5, 1.0, 1.5, 2.0, 3.0],
-    "Confirmations.run_ids": ["test-7000", "test-8000"],
+    "Confirmations.run_ids": ["test-7000", "test-8000"], "Withdrawals.run_ids": ["test-7000", "test-8000"],
+    "Corrections.cycles": {"test-7000": 7000, "test-8000": 8000},
     "SeverityWeighed.probabilities": [0.01, 0.07, 0.83, 0.08, 0.01, 0.0], "clutch_id": "bench3-017",
     "any_of": ["failure", "maintenance"], "EventOut.value": 3900.0, "EventOut.limit": 4000.0,
     "url": "https://example.org/hook", "secret": "wet-clutch-7000", "DeliveryOut.status": 503,
@@ -63,7 +64,7 @@ _OWN: dict[str, Any] = {
     "Preview.above": [["Prüfstand", "3"], ["Lastspiele", "7000"]], "tables": ["Messung", "Notizen"],
     "first_rows": [["5,0", "120", "21,9"]], "units": {"torque_nm": ["Nm", "N·m", "kNm"]},
     "Preview.kinds": ["stationary_stribeck"], "Preview.rows": 140_000, "Preview.missing": ["cycles"],
-    "missing": "-9999,n/a", "stop_s": 17.5,
+    "missing": "-9999,n/a", "good": "192", "stop_s": 17.5,
     "reading": {"columns": [{"title": "Mz", "channel": "torque_nm", "unit": "Nm"}], "decimal": ","}, "fluid": "ATF",
     "friction_material": "paper", "map": "torque_nm:Mz,speed_rpm:n",
     "message": "the run is later than runs that came before it", "note": "fresh ATF",

@@ -130,7 +130,7 @@ def test_a_list_is_of_what_was_asked_for_and_says_states_and_why(fleet: TestClie
     states = {item["clutch_id"]: item["state"] for item in fleet.get("/v1/clutches").json()["items"]}
     assert states == {
         "ended": {"name": "failure", "why": "the end of life is reached: its limit is mean COF at 50 % of new"},
-        "ageing": {"name": "normal", "why": "safe for 2,400 more cycles (95 %)"},
+        "ageing": {"name": "normal", "why": "safe for 2,200 more cycles (95 %)"},
         "c1": {"name": "check", "why": "no run counts yet"},
     }
     assert fleet.get("/v1/clutches/ended").json()["state"] == states["ended"]
