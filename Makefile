@@ -15,6 +15,9 @@
 #              SUBSET=name: verdicts on a fixed set of campaigns, kept in .blind/name;
 #              ARGS="--against other" puts two of them beside each other; ABLATE=each: every number that gates a verdict
 #              taken for another (ABLATE=NUMBER=value: one)
+# make law     diagnoses campaigns whose friction curve is not eq. 3 (measured curves of ../shared, eq. 3 with a share of their
+#              misfit, other formulas): a table of docs/appendix/diagnosis.md; goes on where it ended with STORE=FILE
+#              (SEED= SIZE=small|full ONLY= ARGS=--write)
 # make oracle  of campaigns in which the diagnosis fell short, how many one could name who knows the forms; reads what
 #              `make blind` stored                                                         (the same SEED= SIZE= ONLY=)
 # make visible hides effects at twice the amplitude that a report calls visible, and counts alarms (SEED= COUNT= STORE=)
@@ -63,7 +66,7 @@ SLIM := $(LOCK) $(foreach name,$(UNUSED),--no-emit-package $(name))
 # what the first run of the tests compiles, the next ones read: a third of what `make quick` takes
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help compiled docs gallery reference adoption demo shell test quick slow faults check check-python check-javascript lowest benchmark load scale real figures architecture blind oracle visible mutants plausibility score rivals picture lock clean
+.PHONY: help compiled docs gallery reference adoption demo shell test quick slow faults check check-python check-javascript lowest benchmark load scale real figures architecture blind law oracle visible mutants plausibility score rivals picture lock clean
 .DELETE_ON_ERROR:
 
 # the demo's pages link to /help: where it cannot be built, as without the internet, its page says so
@@ -154,6 +157,9 @@ gallery: $(VENV)/.tests
 
 architecture: $(VENV)/.tests
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.architecture
+
+law: $(VENV)/.tests
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.lab.law $(ARGS)
 
 blind: $(VENV)/.tests
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.blind$(if $(ABLATE),.ablations,$(if $(SUBSET),.subset)) $(ARGS)

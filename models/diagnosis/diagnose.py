@@ -16,6 +16,7 @@ from models.diagnosis.explanations.sizes import sizes_of
 from models.diagnosis.pooled_fit.baseline_fit import IndeterminateError, fit_baseline, missing_for_baseline
 from models.diagnosis.raw_records.evidence import raw_evidence
 from models.diagnosis.report.assemble import insufficient, report_of
+from models.diagnosis.report.friction_law import friction_law_of
 from models.diagnosis.report.isolability import isolability_of
 from models.diagnosis.report.report import Report
 from models.diagnosis.validation.extended_model import validate
@@ -43,7 +44,7 @@ def diagnose(
         baseline = fit_baseline(design)
     except IndeterminateError as lacking:
         return insufficient(str(lacking), design)
-    of_gain, of_sizes = rng.spawn(2)
+    of_gain, of_sizes, of_law = rng.spawn(3)
     raw = raw_evidence(campaign, without)
     posterior = posterior_of(baseline, raw, without)
     problem = posterior.problem
@@ -51,5 +52,6 @@ def diagnose(
     extended, gain = validate(problem, posterior.null.fit, judgement, of_gain)
     sizes = sizes_of(problem, judgement, of_sizes)
     advice = advise(campaign, problem, *rivals_of(judgement))
-    report = report_of(baseline, posterior, judgement, raw, extended, gain, sizes, advice)
+    law = friction_law_of(problem, judgement.stand[0].fit if judgement.stand else posterior.null.fit, of_law)
+    report = report_of(baseline, posterior, judgement, raw, extended, gain, sizes, advice, law)
     return replace(report, isolability=isolability_of(campaign, posterior)) if isolability else report

@@ -64,6 +64,11 @@ class CandidateOut(base.Answer):
     probability: Number = Field(description="Probability that the effect is at work")
     log_evidence_gain: Number = Field(description="Gain in log evidence over the baseline, nats")
     estimate: Amplitude = Field(description="Its amplitude")
+    isolability: Number = Field(
+        default=None,
+        description="Share of its evidence that is left when the friction curve may have another form than eq. 3, 0 to 1; "
+        "below 0.5 it is never named; null if it was not fitted",
+    )
     beside: list[str] = Field(
         default_factory=list,
         description="Effects that were fitted together with it; evidence and estimate belong to this fit",
@@ -115,6 +120,52 @@ class GainOut(base.Answer):
         description="Gain in log score when the last states are predicted from the first ones, nats"
     )
     remaining_useful_life: BeforeAndAfter = Field(description="Remaining useful life under both models")
+
+
+class LawBandOut(base.Answer):
+    """A range of speeds in which the friction curve differs from eq. 3."""
+
+    axis: Literal["speed_rpm"] = Field(description="The channel")
+    from_rpm: float = Field(description="Its lowest speed, rpm")
+    to_rpm: float = Field(description="Its highest speed, rpm")
+    share: float = Field(description="Its share of the squared difference, 0 to 1")
+
+
+class LawGainOut(base.Answer):
+    """What the friction law as found gains over eq. 3 on runs that were left out of the fit."""
+
+    rmse_before_nm: Number = Field(description="The error of eq. 3, RMS, Nm")
+    rmse_after_nm: Number = Field(description="The error of the law as found, RMS, Nm")
+    reduction_percent: Number = Field(description="Reduction of the error, %")
+    reduction_percent_sd: Number = Field(description="Its standard deviation, paired by points")
+    log_score_gain: Number = Field(description="Gain in log score, nats")
+
+
+class FrictionLawOut(base.Answer):
+    """How the measured friction curve differs from eq. 3, whatever the verdict is."""
+
+    rms_percent: float = Field(description="Difference from eq. 3, RMS over the plateaus, % of the torque")
+    interval_percent: list[float] = Field(description="Its 90 % interval, %")
+    where: list[LawBandOut] = Field(description="The speeds at which it differs, largest share first")
+    effect_on_mean_cof_percent: float = Field(description="Change of mean COF at the last test against eq. 3, %")
+    effect_on_remaining_cycles_percent: Number = Field(
+        description="Change of the remaining cycles against eq. 3, %; null if no end is in sight under either"
+    )
+    gain: LawGainOut | None = Field(
+        description="What it gains on held-out runs; null if eq. 3 is exact or none can be left out"
+    )
+
+
+class LawCurveOut(base.Answer):
+    """A friction curve at one pressure and count of cycles: measured, by eq. 3, and by the law as found."""
+
+    pressure_bar: float = Field(description="Line pressure, bar")
+    cycles: float = Field(description="Duty cycles since new")
+    speed_rpm: Numbers = Field(description="Sliding speed, rpm")
+    measured_nm: Numbers = Field(description="Measured torque, Nm")
+    eq3_nm: Numbers = Field(description="Torque by eq. 3, Nm")
+    law_nm: Numbers = Field(description="Torque by the law as found, Nm")
+    law_sd_nm: Numbers = Field(description="Its standard deviation, Nm")
 
 
 class AdviceOut(base.Answer):
@@ -262,6 +313,14 @@ class DiagnosisListed(base.Answer):
     baseline: MisfitOut = Field(description="The baseline's error")
     extended: MisfitOut = Field(description="The extended model's error")
     gain: GainOut = Field(description="What the extended model gains on runs that were left out of the fit")
+    friction_law: FrictionLawOut | None = Field(
+        default=None,
+        description="How the friction curve differs from eq. 3; null without a verdict or without plateaus",
+    )
+    like_the_law: list[str] = Field(
+        default_factory=list,
+        description="Effects that would explain the data, but cannot be told from the form of the friction curve",
+    )
     advice: list[AdviceOut] = Field(description="Tests that would distinguish the remaining explanations")
     visible: list[VisibleOut] = Field(description="The smallest amplitude of each effect that these data would show")
     not_adoptable: str | None = Field(
@@ -276,6 +335,9 @@ class DiagnosisOut(DiagnosisListed):
 
     maps: MapsOut | None = Field(description="Residual maps; null without a verdict")
     loops: list[LoopTraceOut] = Field(description="Measured friction loops beside both models'")
+    law_curves: list[LawCurveOut] = Field(
+        default_factory=list, description="Measured friction curves beside eq. 3 and the law as found"
+    )
     isolability: IsolabilityOut | None = Field(
         default=None, description="Which causes these tests could distinguish; null if not requested"
     )

@@ -61,6 +61,8 @@ def shown(report: Mapping[str, Any]) -> Iterator[RenderableType]:
     if report["candidates"]:
         shown_ones = [item for item in report["candidates"] if (item["probability"] or 0.0) >= _MIN_PROBABILITY]
         yield _candidates((shown_ones or report["candidates"])[:_MAX_CANDIDATES])
+    if report["friction_law"] is not None:
+        yield Text(_friction_law(report["friction_law"]))
     if report["maps"] is not None:
         yield _maps(report["maps"])
     axes = [_spelt(item["axis"]) for item in report["baseline"]["where"] if item["p_value"] < _SHOWN_P]
@@ -80,6 +82,17 @@ def shown(report: Mapping[str, Any]) -> Iterator[RenderableType]:
         yield Text(f"Note: {note}", style="dim")
     if report["adopted"]:
         yield Text("The extended model is adopted: tracking and remaining life use it from now on.", style="bold")
+
+
+def _friction_law(law: Mapping[str, Any]) -> str:
+    """How far the friction curve is from eq. 3, and what that gains."""
+    low, high = law["interval_percent"]
+    text = (
+        f"Friction curve against eq. 3: {number(law['rms_percent'], 2)} % ({number(low, 2)} to {number(high, 2)} %) RMS"
+    )
+    if law["gain"] is not None and law["gain"]["reduction_percent"] is not None:
+        text += f"; the curve as found predicts held-out runs {number(law['gain']['reduction_percent'], 2)} % better"
+    return text
 
 
 def _use(advice: Mapping[str, Any]) -> str:

@@ -34,16 +34,23 @@ EACH: dict[str, tuple[object, ...]] = {
     "UNCATALOGUED_SHARE": (0.03,),
     "TEMPLATE_ERRORS": (((0.25, 0.05),),),
     "CONTRAST_SIZES": ((0.003,),),
+    "FORM_SIZES": ({0.0: 1.0},),
+    "PRESSURE_SIZES": ({0.0: 1.0},),
+    "LIFE_SIZES": ({0.0: 1.0},),
+    "USUAL_LAW": ((0.0, 0.0, 0.0),),
+    "ISOLABLE": (0.0, 0.7),
+    "NEGLIGIBLE_SIZES": (0.2,),
+    "LEAST_REPEATS": (10**9,),
     "NEGLIGIBLE": (0.1,),
     "SLACK": (0.0,),
     "MOST_REFITS": (5, 1000),
     "LIKELY": (0.35, 0.65),
     "SURE": (0.8, 0.95),
     "SHARP": (1e9,),
-    "MISFIT": (1e9,),
 }
-#: Those that act on the noise, and those that act on what was found: the search is as it is.
-ON_NOISE, ON_WHAT_WAS_FOUND = {"SHARP"}, {"LIKELY", "SURE", "MISFIT"}
+#: Those that act on the baseline, and those that act on what was found: the search is as it is.
+ON_BASELINE = {"SHARP", "LEAST_REPEATS", "FORM_SIZES", "PRESSURE_SIZES", "LIFE_SIZES", "NEGLIGIBLE_SIZES"}
+ON_WHAT_WAS_FOUND = {"LIKELY", "SURE"}
 AS_IT_IS = "as it is"
 
 
@@ -78,7 +85,7 @@ def verdicts(trial: Trial, numbers: Mapping[str, Sequence[object]]) -> dict[str,
             began, other = process_time(), search
             with patch.object(criteria, number, value):
                 if number not in ON_WHAT_WAS_FOUND:
-                    other = Search(fit_baseline(design) if number in ON_NOISE else baseline, raw, trial.without)
+                    other = Search(fit_baseline(design) if number in ON_BASELINE else baseline, raw, trial.without)
                     other.run()
                 out[f"{number} = {value}"] = said(other, began)
     return out

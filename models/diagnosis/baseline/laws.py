@@ -19,12 +19,13 @@ Source: Ompusunggu, Janssens, Sas, ISRN Tribology 2013, 607279, eqs. 2, 3, 6, fi
 course of C are this project's.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from models.arrays import FloatArray
 from models.diagnosis import criteria
+from models.diagnosis.baseline.law_form import LearnedLaw
 from models.diagnosis.design.design import IntArray, Points
 from models.diagnosis.design.facts import Facts
 from models.friction.stribeck import GAMMA
@@ -73,6 +74,7 @@ class Laws:
 
     theta: FloatArray
     frame: Frame
+    learned: LearnedLaw | None = None  # how friction differs from them, for what changes pressure, speed or cycles
 
     def parameters(self, pressure: FloatArray, cycles: FloatArray, *, below: float = 0.0) -> FloatArray:
         """M_s, M̄_c, V_S, C_v [n, 4] at pressure [n] Pa and cycles [n]. V_S is kept above 0, the others are as fitted.
@@ -132,7 +134,7 @@ class Laws:
             lost = block[ENDS] * block[SHARES]
             block[ENDS] += by
             block[SHARES] = lost / block[ENDS]
-        return Laws(theta=theta, frame=self.frame)
+        return replace(self, theta=theta)
 
     def by_pressure(self, pressure: FloatArray, cycles: FloatArray) -> FloatArray:
         """d(M_s, M̄_c, V_S, C_v)/dp [n, 4] 1/Pa."""
@@ -223,6 +225,13 @@ class Scene:
         gone = (self.points.cycles - self.facts.states[0]) / self.facts.life
         return np.asarray(np.maximum(gone, 0.0), dtype=np.float64)
 
+    def learned_share(self, velocity: FloatArray) -> FloatArray:
+        """δ [P] at the points under another velocity [P] m/s, as far as it was learned."""
+        learned = self.laws.learned
+        if learned is None:
+            return np.zeros_like(velocity)
+        return learned.share(velocity, self.points.pressure, self.points.cycles)
+
     @property
     def by_pressure(self) -> FloatArray:
         """∂S/∂p [P] Nm/Pa along the laws."""
@@ -251,15 +260,19 @@ class Scene:
         velocity: FloatArray | None = None,
         pressure: FloatArray | None = None,
     ) -> FloatArray:
-        """S [P] Nm with other cycles, velocity [m/s] > 0 or pressure [Pa] at the points. Under another pressure M̄_c's law
-        goes on BELOW the lowest that was measured: it is the same clutch there."""
+        """S (1 + δ) [P] Nm with other cycles, velocity [m/s] > 0 or pressure [Pa] at the points. Under another pressure
+        M̄_c's law goes on BELOW the lowest that was measured: it is the same clutch there."""
         p = self.points.pressure if pressure is None else pressure
+        v = self.points.velocity if velocity is None else velocity
         parameters = self.parameters
         if cycles is not None or pressure is not None:
             parameters = self.laws.parameters(
                 p, self.points.cycles if cycles is None else cycles, below=0.0 if pressure is None else criteria.BELOW
             )
-        return self.points.engaged * curve(self.points.velocity if velocity is None else velocity, parameters)
+        torque = self.points.engaged * curve(v, parameters)
+        if self.laws.learned is None:
+            return torque
+        return torque * (1.0 + self.laws.learned.share(v, p, self.points.cycles if cycles is None else cycles))
 
 
 def gradient_of(velocity: FloatArray, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:

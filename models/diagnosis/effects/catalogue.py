@@ -22,7 +22,6 @@ from models.diagnosis.effects.thermal import HYDRODYNAMIC_DRAG, INTERFACE_HEATIN
 CATALOGUE: tuple[Effect, ...] = (
     begins(OIL_TEMPERATURE),
     begins(INTERFACE_HEATING),
-    begins(VISCOUS_EXPONENT),
     begins(HYDRODYNAMIC_DRAG),
     TORQUE_ZERO_SHIFT,
     PRESSURE_OFFSET,
@@ -39,7 +38,10 @@ CATALOGUE: tuple[Effect, ...] = (
     REST_RECOVERY,
 )
 
-BY_SLUG = {effect.slug: effect for effect in CATALOGUE}
+#: No causes any more, for nothing tells them from the form of the friction curve; reports that are stored name them.
+RETIRED: tuple[Effect, ...] = (begins(VISCOUS_EXPONENT),)
+
+BY_SLUG = {effect.slug: effect for effect in (*CATALOGUE, *RETIRED)}
 
 
 def effects_for(facts: Facts, without: frozenset[str] = frozenset()) -> list[Effect]:

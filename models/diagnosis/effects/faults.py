@@ -144,7 +144,7 @@ FAULTS: tuple[Effect, ...] = (
     _step(
         "speed_scale_step",
         "another scale of the speed, as of another encoder or belt",
-        lambda scene, a, _: scene.curve_at(velocity=scene.points.velocity * _factor(a)) - scene.curve,
+        lambda scene, a, _: scene.curve_at(velocity=scene.points.velocity * _factor(a)) - scene.curve_at(),
     ),
     _step("static_torque_step", "a step of the static torque", _parameter_scaled("static_torque")),
     _step("stribeck_velocity_step", "a step of the Stribeck velocity", _parameter_scaled("stribeck_velocity")),

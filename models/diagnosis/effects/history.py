@@ -191,7 +191,7 @@ LOAD_SEVERITY = Effect(
     positive=True,
     grid=_load_severity_grid,
     change=lambda scene, amplitude, _: (
-        scene.curve_at(cycles=effective_cycles(scene.points.cycles, scene.facts, amplitude)) - scene.curve
+        scene.curve_at(cycles=effective_cycles(scene.points.cycles, scene.facts, amplitude)) - scene.curve_at()
     ),
     before_lag=True,
     discrepancies=(Discrepancy.LIFE,),

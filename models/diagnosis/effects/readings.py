@@ -225,7 +225,8 @@ def _unsettled_dwell_change(scene: Scene, amplitude: float, shape: Shape) -> Flo
         difference = np.clip(difference, -limit, limit)
     else:
         keep = np.where(follows, float(np.clip(amplitude * carried, 0.0, 0.95)), 0.0)
-        difference = recursion(keep, (1.0 - keep) * scene.curve)[before] - scene.curve  # what each plateau ends with
+        settled = scene.curve_at()
+        difference = recursion(keep, (1.0 - keep) * settled)[before] - settled  # what each plateau ends with
     return np.asarray(amplitude * np.where(follows, difference, 0.0), dtype=np.float64)
 
 
@@ -262,7 +263,7 @@ def _channel_delay_change(scene: Scene, amplitude: float, _shape: Shape) -> Floa
     looping = np.flatnonzero(points.loop >= 0)
     if looping.size:
         velocity, frequency = by_loop(points, looping)
-        curves, phases = scene.curve[looping].reshape(velocity.shape), velocity.shape[1]
+        curves, phases = scene.curve_at()[looping].reshape(velocity.shape), velocity.shape[1]
         step = amplitude * frequency * phases / (2 * np.pi)
         out[looping] = (_shifted(curves, np.clip(step, -phases, phases)) - curves).ravel()
     return out

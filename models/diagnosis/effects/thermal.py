@@ -80,7 +80,10 @@ def _oil_temperature_change(scene: Scene, amplitude: float, shape: Shape) -> Flo
     m_s, m_c, v_s, _ = scene.parameters.T
     later = np.exp(-np.minimum(v_s * np.exp(np.clip(shape[0] * exponent, -3.0, 3.0)) / scene.points.velocity, 700.0))
     film = scene.points.engaged * m_s * (m_c - 1.0) * (later - scene.decay)
-    return np.asarray(scene.viscous * np.expm1(exponent) + film, dtype=np.float64)
+    # what the law does otherwise than eq. 3 moves along the speed as its fall does
+    moved = scene.points.velocity * np.exp(np.clip(-shape[0] * exponent, -3.0, 3.0))
+    off = scene.curve * (scene.learned_share(moved) - scene.learned_share(scene.points.velocity))
+    return np.asarray(scene.viscous * np.expm1(exponent) + film + off, dtype=np.float64)
 
 
 OIL_TEMPERATURE = Effect(

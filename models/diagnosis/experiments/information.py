@@ -5,8 +5,9 @@ If candidate a is true, a trial shows the torque that a predicts for it; what of
 
     λ_ab = ½ dᵀ V⁻¹ (1 - P_[J_b, U_b]) d      [nats]
 
-with J_b the baseline's sensitivities where b has it, U_b those of b's amplitude, of its smooth shapes unless they are at a
-bound, and of its model discrepancy, each held by its prior. Rows to come have the noise of those measured at their torque.
+with J_b the baseline's sensitivities, those to the law's discrepancy among them, where b has it, U_b those of b's amplitude,
+of its smooth shapes unless they are at a bound, and of its model discrepancy, each held by its prior. Rows to come have the
+noise of those measured at their torque.
 """
 
 from collections.abc import Sequence
@@ -23,7 +24,7 @@ from models.diagnosis.baseline.prediction import Prediction, predict
 from models.diagnosis.design.design import Design
 from models.diagnosis.effects.fitted_effect import factors_at, ranges_of
 from models.diagnosis.pooled_fit.gauss_newton import Fit
-from models.diagnosis.pooled_fit.problem import FitProblem
+from models.diagnosis.pooled_fit.problem import FitProblem, LawTerms
 from models.diagnosis.pooled_fit.projection import Gram, gram_of, project
 
 
@@ -49,7 +50,10 @@ class CandidateDistances:
         noise = replace(self._problem.noise, deviation=np.sqrt((constant + share * torque**2) / added.samples))
         priors = self._problem.priors  # they are in the measured rows already
         none = replace(priors, rows=priors.rows[:0], means=priors.means[:0])
-        return self._grams(FitProblem(design=added, noise=noise, priors=none), predictions)
+        law = self._problem.law and LawTerms(
+            self._problem.law.discrepancy, self._problem.law.discrepancy.columns(added)
+        )
+        return self._grams(FitProblem(design=added, noise=noise, priors=none, law=law), predictions)
 
     def distances(self, ahead: Sequence[list[Gram]]) -> FloatArray:
         """λ [k, k] nats of each candidate (row), if it is true, against each other one (column), with runs to come."""
@@ -61,7 +65,7 @@ class CandidateDistances:
         for more in ahead:
             grams = [_joined(gram, added) for gram, added in zip(grams, more, strict=True)]
         noise = self._problem.noise
-        projections = [project(gram, noise.run_gain, noise.curve_gain) for gram in grams]
+        projections = [project(gram, noise.run_gain, noise.curve_gain, noise.law) for gram in grams]
         columns = [0.5 * np.maximum(np.diag(projected.info), 0.0) for projected in projections]
         freedom = [projected.evidence - projected.profile for projected in projections]
         return np.stack(columns, axis=1), np.array(freedom)
@@ -71,7 +75,7 @@ class CandidateDistances:
         place = int(self._problem.priors.free.sum())
         gram, noise, deviations = self._measured[0], self._problem.noise, list[float]()
         for joined in (gram, reduce(_joined, [more[0] for more in ahead], gram)):
-            variance = joined.covariance(noise.run_gain, noise.curve_gain)[place, place]
+            variance = joined.covariance(noise)[place, place]
             deviations.append(float(np.sqrt(max(variance, 0.0))))
         return deviations[1] / max(deviations[0], 1e-300)
 

@@ -1,9 +1,9 @@
 """Smooth contrasts: shapes of structure that any unknown cause might have, each on the axes on which it lives.
 
-They are relative to the predicted torque (structure in friction scales with it). What other laws of speed, pressure and
-life than the baseline's would add is friction: products of cosines, which loops show with their lag. There speed counts
-as v^γ (eq. 2), because most of a curve's shape lies within its lowest tenth. The others are cosines over the clock and
-the torque, bumps and kinks in speed, waves over a loop's phase, and single states. Axes: `design.design`.
+They are relative to the predicted torque (structure in friction scales with it): ripples over speed, which loops show with
+their lag, bumps and kinks in speed, cosines over the clock and the torque, waves over a loop's phase, and single states.
+What other smooth laws of speed, pressure and life would add is the law's discrepancy (`baseline.law_discrepancy`). Axes:
+`design.design`.
 """
 
 from itertools import product
@@ -13,13 +13,10 @@ from numpy.typing import NDArray
 
 from models.arrays import FloatArray
 from models.diagnosis.baseline.prediction import Prediction
-from models.diagnosis.design.design import CLOCK, CYCLES, PHASE, PRESSURE, SPEED, TEMPERATURE, TORQUE, Design
-from models.friction.stribeck import GAMMA
+from models.diagnosis.design.design import CLOCK, CYCLES, PHASE, SPEED, TEMPERATURE, TORQUE, Design
 
 #: Waves of a nonlinear sensor over its range; ripples over speed (an encoder's, a mount's).
 TORQUE_WAVES, SPEED_WAVES = 20, range(4, 17)
-#: The product of the orders of waves over speed, pressure and life is this at most. Chosen: 8 waves over speed, as ever.
-MOST_ORDER = 8
 
 
 def contrasts_of(design: Design, prediction: Prediction) -> tuple[FloatArray, list[str]]:
@@ -31,7 +28,8 @@ def contrasts_of(design: Design, prediction: Prediction) -> tuple[FloatArray, li
     life = _rank(rows.cycles)
     states, levels = design.facts.states.size, design.levels.size
     lives, presses = min(states - 1, 3), min(levels - 1, 2)
-    columns, axes = _over_the_laws(design, prediction)
+    columns = list(_ripples(design, prediction).T)
+    axes = [SPEED] * len(columns)
 
     def add(axis: str, column: FloatArray) -> None:
         if float((column * column).sum()) > 0:
@@ -89,36 +87,13 @@ def contrasts_of(design: Design, prediction: Prediction) -> tuple[FloatArray, li
     return np.stack(columns, axis=1) if columns else np.zeros((design.torque.size, 0)), axes
 
 
-def _over_the_laws(design: Design, prediction: Prediction) -> tuple[list[FloatArray], list[str]]:
-    """Columns [N] Nm over speed, pressure and life, and their axes: friction by other laws, which loops show with their lag.
-
-    A law is smooth: of a product of waves the coefficient may be 1/(s p z) as large, its orders in speed, pressure and life.
-    """
+def _ripples(design: Design, prediction: Prediction) -> FloatArray:
+    """Columns [N, m] Nm of friction that ripples over speed, which loops show with its lag."""
     points, friction = design.points, np.abs(prediction.scene.curve)
-    closed = points.engaged > 0
-    even, speed = (_unit(points.velocity**power, closed) for power in (1.0, GAMMA))
-    pressure, life = _unit(points.pressure, closed), _rank(points.cycles)
-    presses, lives = min(design.levels.size - 1, 6), min(design.facts.states.size - 1, 3)
-    shapes = [
-        (_axis(s, p, z), _cosine(s, speed) * _cosine(p, pressure) * _cosine(z, life) / order)
-        for s, p, z in product(range(MOST_ORDER + 1), range(presses + 1), range(lives + 1))
-        if (s or p) and (order := max(s, 1) * max(p, 1) * max(z, 1)) <= MOST_ORDER
-    ]
-    shapes += [(SPEED, wave(np.pi * s * even)) for s in SPEED_WAVES for wave in (np.cos, np.sin)]
-    # at even speeds a sine may be 0 at each
-    varied = [(axis, shape) for axis, shape in shapes if np.abs(shape).max() > 1e-6]
-    changes = friction[:, None] * np.stack([shape for _, shape in varied], axis=1)
-    return list(prediction.change_at_rows(design, changes, before_lag=True).T), [axis for axis, _ in varied]
-
-
-def _axis(s: int, p: int, z: int) -> str:
-    """The axis under which a product of waves of orders s, p, z in speed, pressure and life is reported: speed where it is
-    alone or two orders above both others; else pressure where it takes part (beside life alone from order 2 on); else
-    life."""
-    if (p, z) == (0, 0) or s >= max(p, z) + 2:
-        return SPEED
-    least = 2 if s == 0 and z > 0 else 1
-    return PRESSURE if p >= least else CYCLES
+    even = _unit(points.velocity, points.engaged > 0)
+    shapes = np.stack([wave(np.pi * s * even) for s in SPEED_WAVES for wave in (np.cos, np.sin)], axis=1)
+    shapes = shapes[:, np.abs(shapes).max(axis=0) > 1e-6]  # at even speeds a sine may be 0 at each
+    return prediction.change_at_rows(design, friction[:, None] * shapes, before_lag=True)
 
 
 def _bump(unit: FloatArray, centre: float, width: float) -> FloatArray:

@@ -105,7 +105,11 @@ def judge(posterior: Posterior) -> Judgement:
 
 def _fitted(posterior: Posterior) -> tuple[Fitted, ...]:
     """The causes that were fitted, alone and in pairs, most probable first."""
-    named = [alternative for alternative in posterior.nodes if alternative != NOTHING and not alternative.unknown]
+    named = [
+        alternative
+        for alternative in posterior.nodes
+        if alternative != NOTHING and not alternative.unknown and alternative in posterior.weights
+    ]
     return tuple(
         Fitted(
             slugs=tuple(effect.effect.slug for effect in posterior.nodes[alternative].fit.effects),

@@ -2,28 +2,29 @@
 
     Z = Σ_g p(g) mean_t ∫ p(data | θ, a, shapes, b, c; g) p(θ, a, shapes) N(b; 0, τ_t²) N(c; 0, τ²) d(θ, a, shapes, b, c)
 
-g is the scatter of the gains, b the template's error (its change is multiplied by 1 + Σ_k b_k φ_k), c the coefficients of
-smooth structure. It is Laplace's integral about the fit in (θ, a, shapes); b and c, linear beside it, are integrated out in
-closed form on the residual projected there. The size τ_t of a template's error is averaged over (`TEMPLATE_ERRORS`): held
-to one, it charges an exact template for what it is not. A shape at its bound has only the side that falls off there,
-∫ e^{-gt - ht²/2} dt.
+g is the scatter of the gains and the sizes of the law's discrepancy, b the template's error (its change is multiplied by 1 +
+Σ_k b_k φ_k), c the coefficients of smooth structure. It is Laplace's integral about the fit in (θ, a, shapes); b and c,
+linear beside it, are integrated out in closed form on the residual projected there. The size τ_t of a template's error is
+averaged over (`TEMPLATE_ERRORS`): held to one, it charges an exact template for what it is not. A shape at its bound has
+only the side that falls off there, ∫ e^{-gt - ht²/2} dt.
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import compress
 
 import numpy as np
 from scipy.special import erfcx
 
 from models.arrays import FloatArray
 from models.diagnosis import criteria
+from models.diagnosis.baseline.law_form import LawSizes
 from models.diagnosis.design.design import Design
 from models.diagnosis.effects.fitted_effect import discrepancy_factors, ranges_of, small_factors_at
 from models.diagnosis.explanations.contrasts import contrasts_of
-from models.diagnosis.noise.covariance import Noise
 from models.diagnosis.pooled_fit.gauss_newton import Fit
 from models.diagnosis.pooled_fit.problem import FitProblem
-from models.diagnosis.pooled_fit.projection import GAINS, Gram, Projected, gram_of, project
+from models.diagnosis.pooled_fit.projection import Gram, Projected, gram_of, isolability, projections_beside
 from models.gaussian_evidence import independent, log_gain, log_gain_alone, log_mean, log_sum
 
 
@@ -32,12 +33,11 @@ class Evidence:
     """About one fit [nats, up to one constant]."""
 
     whole: float  # with the templates' errors
+    isolability: tuple[float, ...]  # ι of each effect, beside the sizes of the law that are likely here
     structure: Mapping[str, float]  # what smooth structure adds to it, by axis
     patterns: Mapping[str, FloatArray]  # its likeliest form [N] Nm
-    screened: tuple[Projected, ...]  # the given changes projected off the fit, one for each scatter of the gains
-    # χ²/N that is left when the templates' errors and structure on all axes, at its largest size, have taken their part (if
-    # it was wanted), near 1 where that is noise
-    misfit: float
+    # the given changes projected off the fit, one for each scatter of the gains and size of the law
+    screened: tuple[Projected, ...]
 
 
 def evidence_of(problem: FitProblem, fitted: Fit, beside: FloatArray | None = None, *, smooth: bool = True) -> Evidence:
@@ -45,13 +45,13 @@ def evidence_of(problem: FitProblem, fitted: Fit, beside: FloatArray | None = No
     structure beside it unless not wanted."""
     design = problem.design
     nothing = np.zeros((design.torque.size, 0))
-    contrasts, lies = contrasts_of(design, fitted.prediction) if smooth else (nothing, [])
+    contrasts, lies = visible_contrasts(problem, fitted) if smooth else (nothing, [])
     factors, uncertain = template_errors(design, fitted)
-    changes = (nothing if beside is None else beside, contrasts, off_by(design, fitted, factors))
-    gram = gram_of(problem, fitted, np.concatenate(changes, axis=1))
+    changes = (contrasts, off_by(design, fitted, factors))
+    gram = gram_of(problem, fitted, np.concatenate(changes, axis=1), screened=beside)
     gram, outward = _held_at_bounds(gram, int(problem.priors.free.sum()), fitted)
     ends = np.cumsum([outward.size, *(change.shape[1] for change in changes)])
-    at_bounds, catalogue, contrasted, wrong = (slice(a, b) for a, b in zip([0, *ends[:-1]], ends, strict=True))
+    at_bounds, contrasted, wrong = (slice(a, b) for a, b in zip([0, *ends[:-1]], ends, strict=True))
     axes = np.array(lies)
     places = {axis: contrasted.start + np.flatnonzero(axes == axis) for axis in dict.fromkeys(lies)}
     prior = _log_prior(fitted)
@@ -68,19 +68,13 @@ def evidence_of(problem: FitProblem, fitted: Fit, beside: FloatArray | None = No
                     projected.info[np.ix_(columns_of_axis, columns_of_axis)], projected.score[columns_of_axis]
                 )
             )
-        info, score = projected.info[catalogue, catalogue], projected.score[catalogue]
-        screened.append(replace(projected, info=info, score=score, whole=projected.whole[catalogue], evidence=base))
+        none = np.zeros(0)
+        screened.append(replace(projected, info=np.zeros((0, 0)), score=none, whole=none, evidence=base))
     total = log_sum(wholes)
     likely = projections[int(np.argmax(wholes))]
-    flexible = slice(contrasted.start, wrong.stop)
-    sd = np.concatenate(
-        [np.full(len(axes), criteria.CONTRAST_SIZES[-1]), np.where(uncertain > 0, *criteria.TEMPLATE_ERRORS[-1])]
-    )
-    values, vectors = independent(sd[:, None] * likely.info[flexible, flexible] * sd)
-    score = vectors.T @ (sd * likely.score[flexible])
     return Evidence(
-        misfit=(likely.miss - float((score**2 / (1.0 + values)).sum())) / design.torque.size,
         whole=total,
+        isolability=_isolability(problem, fitted, likely),
         structure={axis: log_sum(logs) - total for axis, logs in structures.items()},
         patterns={
             axis: contrasts[:, axes == axis]
@@ -91,10 +85,25 @@ def evidence_of(problem: FitProblem, fitted: Fit, beside: FloatArray | None = No
     )
 
 
-def projections_beside(gram: Gram, noise: Noise) -> list[Projected]:
-    """At every second scatter of the runs' gains, with the curves' as estimated without an effect and with none: an effect
-    may be what made them scatter."""
-    return [project(gram, gain, curve) for curve in sorted({noise.curve_gain, 0.0}) for gain in GAINS[::2].tolist()]
+def _isolability(problem: FitProblem, fitted: Fit, likely: Projected) -> tuple[float, ...]:
+    """ι of each effect as it was fitted, beside the baseline without effects: whether something is at work there, not how
+    well its amplitude is known."""
+    if not fitted.effects:
+        return ()
+    changes = np.stack([effect.rows(problem.design, fitted.prediction) for effect in fitted.effects], axis=1)
+    noise = likely.noise(problem.noise)
+    alone = isolability(problem.with_noise(noise), replace(fitted, effects=()), changes, noise.law)
+    return tuple(np.clip(alone, 0.0, 1.0).tolist())
+
+
+def visible_contrasts(problem: FitProblem, fitted: Fit) -> tuple[FloatArray, list[str]]:
+    """The contrasts [N, m] Nm, with their axes, of which most is visible beside a law that is off by USUAL_LAW: what is not
+    is a difference of the law, and the law has it already."""
+    contrasts, axes = contrasts_of(problem.design, fitted.prediction)
+    if problem.law is None or not axes:
+        return contrasts, axes
+    shown = isolability(problem, fitted, contrasts, LawSizes(*criteria.USUAL_LAW)) >= criteria.ISOLABLE
+    return contrasts[:, shown], list(compress(axes, shown))
 
 
 def template_errors(design: Design, fitted: Fit) -> tuple[list[FloatArray], FloatArray]:
@@ -155,12 +164,15 @@ def _held_at_bounds(gram: Gram, first: int, fitted: Fit) -> tuple[Gram, FloatArr
         out = np.array([1.0, *(1.0 if 2 * x > shape.lowest + shape.highest else -1.0 for x, shape in smooth)])
         ways += np.where(effect.free, 0.0, out).tolist()
     outward = np.array(ways)
-    at_bound = first + np.flatnonzero(outward)
+    at_bound = gram.laws + first + np.flatnonzero(outward)
     order = np.concatenate(
         [np.setdiff1d(np.arange(gram.base), at_bound), at_bound, np.arange(gram.base, gram.matrix.shape[0])]
     )
-    matrix, along = gram.matrix[np.ix_(order, order)], gram.along[..., order]
-    return replace(gram, matrix=matrix, along=along, base=gram.base - at_bound.size), outward[outward != 0]
+    matrix, along, screened = gram.matrix[np.ix_(order, order)], gram.along[..., order], gram.screened
+    if screened is not None:
+        screened = replace(screened, cross=screened.cross[order])
+    held = replace(gram, matrix=matrix, along=along, base=gram.base - at_bound.size, screened=screened)
+    return held, outward[outward != 0]
 
 
 def _beside_bounds(projected: Projected, held: slice, outward: FloatArray) -> float:

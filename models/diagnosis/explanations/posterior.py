@@ -40,10 +40,11 @@ from models.diagnosis.effects.thermal import OIL_TEMPERATURE
 from models.diagnosis.explanations.evidence import Evidence, evidence_of
 from models.diagnosis.explanations.shapeless import highest_line, line_evidence, outlier_evidence, temperature_evidence
 from models.diagnosis.explanations.verdict import LINE, LINES, NOTHING, OUTLIER, Alternative, is_axis
+from models.diagnosis.noise.estimate import unlike
 from models.diagnosis.pooled_fit.baseline_fit import Baseline
 from models.diagnosis.pooled_fit.gauss_newton import Fit, fit, refit, refit_beside
 from models.diagnosis.pooled_fit.problem import FitProblem
-from models.diagnosis.pooled_fit.projection import Projected, without_likely_gains
+from models.diagnosis.pooled_fit.projection import Projected, Screened, left_over
 from models.diagnosis.raw_records.evidence import RawEvidence
 from models.gaussian_evidence import log_gain_alone, log_positive, log_sum
 
@@ -53,8 +54,14 @@ class Start(NamedTuple):
 
     promise: float  # [nats], its prior included
     column: Column  # its best
-    gain: int  # the place of the scatter of the gains that suits that
+    gain: int  # the place of the projection (scatter of the gains, size of the law) that suits that
     fitted: FittedEffect  # the linear fit of it
+
+
+def screen_of(projected: Projected) -> Screened:
+    """What was screened; nothing where no column was."""
+    none = np.zeros(0)
+    return projected.screened or Screened(info=none, score=none, whole=none)
 
 
 def starts(columns: Sequence[Column], screened: Sequence[Projected]) -> dict[str, list[Start]]:
@@ -67,7 +74,7 @@ def starts(columns: Sequence[Column], screened: Sequence[Projected]) -> dict[str
     null = log_sum([projected.evidence for projected in screened])
     by_gain = []
     for projected in screened:
-        info, score = np.maximum(np.diag(projected.info), 0.0), projected.score
+        info, score = screen_of(projected).info, screen_of(projected).score
         wide = np.outer(SCALES, sd)
         gain = log_gain_alone(info, score, wide) + np.where(positive, log_positive(info, score, wide), 0.0)
         by_gain.append(projected.evidence + np.logaddexp.reduce(gain, axis=0) - np.log(len(SCALES)) + weight)
@@ -80,8 +87,8 @@ def starts(columns: Sequence[Column], screened: Sequence[Projected]) -> dict[str
     for (slug, _), kind_starts in kinds.items():
         best = kind_starts[int(np.argmax(total[kind_starts]))]
         likely = int(np.argmax(table[:, best]))
-        precision = screened[likely].info[best, best] + (SCALES[-1] * sd[best]) ** -2.0
-        amplitude = float(screened[likely].score[best] / precision)
+        screen = screen_of(screened[likely])
+        amplitude = float(screen.score[best] / (screen.info[best] + (SCALES[-1] * sd[best]) ** -2.0))
         column = columns[best]
         fitted = FittedEffect(effect=column.effect, amplitude=amplitude, shape=column.shape)
         promise = log_sum(total[kind_starts]) - null
@@ -122,6 +129,10 @@ class Posterior:
     problem: FitProblem  # that all refits share
     columns: tuple[Column, ...]  # that were screened
     refits: int
+    #: ι of each cause that was refitted, the largest of its explanations'; and the probability of those that were counted as
+    #: the law's form, for they cannot be told from it.
+    isolability: Mapping[str, float]
+    like_the_law: Mapping[str, float]
 
     @property
     def null(self) -> Node:
@@ -167,6 +178,7 @@ class Search:
     def __init__(self, baseline: Baseline, raw: Sequence[RawEvidence], without: frozenset[str]) -> None:
         facts = baseline.problem.design.facts
         effects = effects_for(facts, without)
+        self._exact = replace(baseline.exact.laws, learned=baseline.fit.laws.learned)
         self._raw = {r.effect: r.log_evidence for r in raw if r.effect in BY_SLUG and not is_vibration(r)}
         self.problem = self._null_problem = baseline.problem
         self._columns, self._changes = _shown(self.problem, baseline.fit, columns_of([*effects, *FAULTS], facts))
@@ -322,7 +334,11 @@ class Search:
         promise: float,
     ) -> None:
         """One refit more of an alternative; the better one of each kind of shapes is kept."""
-        fitted = refit(self.problem, start.laws, effects)
+        # beside a loud cause the law's form goes as far as its sizes allow, and bends eq. 3 along: from there a refit with
+        # the cause may end elsewhere
+        laws = (start.laws, self._exact)[: 2 if len(effects) == 1 else 1]
+        refits = [fitted for one in laws if (fitted := refit(self.problem, one, effects)) is not None]
+        fitted = min(refits, key=lambda one: one.cost, default=None)
         node = None if fitted is None else self._node(fitted, alternative.causes, shape_evidence)
         if node is None:
             return
@@ -392,16 +408,15 @@ class Search:
 
     def posterior(self, raw: Sequence[RawEvidence], without: frozenset[str]) -> Posterior:
         """The list as far as it was searched; what was not refitted counts as it was screened
-        about the likeliest parent, no more than what was refitted; a refit that failed excludes it. Where nothing that was
-        refitted leaves noise, the likeliest structure may be as rough as the noise then looks, s² = χ²/N times larger:
-        N (s² - 1 - ln s²)/2 nats."""
+        about the likeliest parent, no more than what was refitted; a refit that failed excludes it."""
         weights = self.weights()
         most = max(weights.values())
         for alternative, (_, promised) in self._nearest.items():
             if alternative not in self.nodes and alternative not in self._failed and not is_axis(alternative.unknown):
                 weights[alternative] = min(promised, most)
         null = self.null
-        left = without_likely_gains(self._null_problem, null.fit)
+        # a line has its own phase in every test: what all tests have in common is the law's
+        left = unlike(self.problem.design, left_over(self._null_problem, null.fit), null.fit.torque)
         swinging = [(record.effect, record.log_evidence) for record in raw if record.effect in LINES]
         for unknown, value in [(LINE, line_evidence(highest_line(self._null_problem, left))), *swinging]:
             line = Alternative((), unknown)
@@ -420,21 +435,55 @@ class Search:
                 weights[twin] = float(np.logaddexp(weights.get(twin, -np.inf), weights[alternative]))
         single = self.prior(Alternative(("",)))
         swings = {record.effect: record.log_evidence for record in raw if is_vibration(record)}
-        misfit = min(nodes[0].evidence.misfit for nodes in self.nodes.values())
-        if misfit > criteria.MISFIT:
-            nameless = [alternative for alternative in weights if alternative.unknown and not alternative.causes]
-            rough = max(nameless, key=weights.__getitem__)
-            inflated = 0.5 * self.problem.design.torque.size * (misfit - 1.0 - np.log(misfit))
-            weights[rough] = max(weights.values()) + inflated
+        isolabilities = self._isolabilities()
+        merged, like_the_law = self._isolable(weights, isolabilities)
         return Posterior(
-            weights={alternative: weight - null.log_evidence for alternative, weight in weights.items()},
+            weights={alternative: weight - null.log_evidence for alternative, weight in merged.items()},
             nodes={alternative: nodes[0] for alternative, nodes in self.nodes.items()},
             vibrations={slug: float(expit(value + single)) for slug, value in swings.items()},
             prior=self.prior,
             problem=self.problem,
             columns=tuple(self._columns),
             refits=self.refits,
+            isolability={
+                slug: max(shares[slug] for shares in isolabilities.values() if slug in shares)
+                for slug in {slug for shares in isolabilities.values() for slug in shares}
+            },
+            like_the_law=like_the_law,
         )
+
+    def _isolabilities(self) -> dict[Alternative, dict[str, float]]:
+        """ι of the effects of each alternative that was refitted, by slug."""
+        return {
+            alternative: {
+                effect.effect.slug: share
+                for effect, share in zip(nodes[0].fit.effects, nodes[0].evidence.isolability, strict=True)
+            }
+            for alternative, nodes in self.nodes.items()
+        }
+
+    def _isolable(
+        self, weights: Mapping[Alternative, float], isolabilities: Mapping[Alternative, Mapping[str, float]]
+    ) -> tuple[dict[Alternative, float], dict[str, float]]:
+        """The weights where a cause of which less than ISOLABLE is left beside the law's discrepancy is the law's: its
+        explanation counts as the same without it. And the probability of each such cause. ι is the larger one of that in
+        the explanation and that of the cause alone."""
+        total = log_sum(list(weights.values()))
+        merged: dict[Alternative, float] = {}
+        like_the_law: dict[str, float] = {}
+        for alternative, weight in weights.items():
+            left = alternative
+            for slug in (
+                *alternative.causes,
+                *((alternative.unknown,) if alternative.unknown in FAULT_BY_SLUG else ()),
+            ):
+                alone = NOTHING.and_effect(slug) or NOTHING
+                known = [shares[slug] for one in (alternative, alone) if slug in (shares := isolabilities.get(one, {}))]
+                if known and max(known) < criteria.ISOLABLE:
+                    left = left.without(slug)
+                    like_the_law[slug] = like_the_law.get(slug, 0.0) + float(np.exp(weight - total))
+            merged[left] = float(np.logaddexp(merged.get(left, -np.inf), weight))
+        return merged, like_the_law
 
 
 def _shown(problem: FitProblem, fitted: Fit, columns: Sequence[Column]) -> tuple[list[Column], FloatArray]:

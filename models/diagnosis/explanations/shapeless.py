@@ -36,11 +36,10 @@ from scipy.special import gammaincc, gammaincinv
 from models.arrays import FloatArray
 from models.diagnosis import criteria
 from models.diagnosis.design.design import Design
-from models.diagnosis.explanations.evidence import projections_beside
 from models.diagnosis.noise.covariance import Noise, whitened
 from models.diagnosis.pooled_fit.gauss_newton import Fit, fit, refit_beside
 from models.diagnosis.pooled_fit.problem import FitProblem
-from models.diagnosis.pooled_fit.projection import gram_of, projections_of, without_likely_gains
+from models.diagnosis.pooled_fit.projection import gram_of, left_over, projections_beside, projections_of
 from models.gaussian_evidence import log_gain, log_mean, log_sum
 
 #: Steps of half a cycle a test: the first (two and a half cycles), slower ones that it must exceed, and the size of a
@@ -174,9 +173,10 @@ def _own_curve(design: Design, here: NDArray[np.bool_]) -> FloatArray:
 
 
 def _worst(problem: FitProblem, fitted: Fit) -> tuple[int | None, FloatArray]:
-    """The run whose error is far larger than the others', if one is, and the error [N] Nm without what gains make of it."""
+    """The run whose error is far larger than the others', if one is, and the error [N] Nm without what gains and the law
+    make of it."""
     design = problem.design
-    left = without_likely_gains(problem, fitted)
+    left = left_over(problem, fitted)
     squares = (left / problem.noise.deviation) ** 2
     count = np.bincount(design.rows.run, minlength=len(design.runs))
     beyond = np.maximum(np.bincount(design.rows.run, weights=squares, minlength=len(design.runs)) - count, 0.0)
@@ -192,7 +192,7 @@ def temperature_evidence(problem: FitProblem, fitted: Fit) -> float:
     """Evidence [nats] of unmeasured courses of oil temperature over none."""
     columns, between, within = _courses(problem.design, fitted)
     gram = gram_of(problem, fitted, columns)
-    projections = list(projections_of(gram, problem.noise))
+    projections = projections_of(gram, problem.noise)
     strengths = product(criteria.CHANGES_BETWEEN_TESTS, criteria.CHANGES_WITHIN_TESTS)
     # of ln ν by some 3 K, as ASTM D341 has it near 85 °C
     sds = [0.06 * (b * between + w * within) for b, w in strengths]

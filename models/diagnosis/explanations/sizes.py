@@ -21,11 +21,11 @@ from models.diagnosis import criteria
 from models.diagnosis.effects.effect import Tried
 from models.diagnosis.effects.fitted_effect import Draw, FittedEffect
 from models.diagnosis.explanations.amplitude_posterior import Proportional
-from models.diagnosis.explanations.evidence import evidence_of, off_by, projections_beside, template_errors
+from models.diagnosis.explanations.evidence import evidence_of, off_by, template_errors
 from models.diagnosis.explanations.verdict import Judgement
 from models.diagnosis.pooled_fit.gauss_newton import Fit, fit
 from models.diagnosis.pooled_fit.problem import FitProblem
-from models.diagnosis.pooled_fit.projection import gram_of
+from models.diagnosis.pooled_fit.projection import Gram, Projected, Reduced, gram_of, projections_beside
 from models.gaussian_evidence import log_sum
 
 #: Values of an amplitude that stand for its density.
@@ -214,18 +214,34 @@ def _most_alike(fitted: Fit, effect: FittedEffect, kind: Sequence[Tried]) -> int
     return int(np.argmax(along))
 
 
+def _that_count(whole: Gram, gram: Gram, problem: FitProblem) -> Iterator[Projected]:
+    """The projections of a fit's effects at each scatter of the gains and size of the law that holds NEGLIGIBLE or more of
+    the posterior about the fit."""
+    about = projections_beside(whole, problem.noise)
+    total = log_sum([projected.evidence for projected in about])
+    reduced: dict[tuple[float, float], Reduced] = {}
+    for projected in about:
+        if projected.evidence > total + np.log(criteria.NEGLIGIBLE):
+            gains = projected.run_gain, projected.curve_gain
+            if gains not in reduced:
+                reduced[gains] = gram.reduced(*gains)
+            yield reduced[gains].beside_law(projected.sizes, projected.log_weight)
+
+
 def _components_of(problem: FitProblem, fitted: Fit, weight: float, rng: np.random.Generator) -> Iterator[_Component]:
-    """A refit's components: one for each scatter of the gains and size of the templates' errors that counts."""
+    """A refit's components: one for each scatter of the gains, size of the law and size of the templates' errors that
+    counts."""
     design, free = problem.design, int(problem.priors.free.sum())
     factors, uncertain = template_errors(design, fitted)
     errors = off_by(design, fitted, factors)
-    gram = replace(gram_of(problem, fitted, errors), base=free)
+    whole_gram = gram_of(problem, fitted, errors)
+    gram = replace(whole_gram, base=whole_gram.laws + free)
     effects, places = fitted.effects, np.arange(len(fitted.effects))
     priors = [np.array([np.inf, *(effect.precisions[1:] ** -0.5)]) for effect in effects]
     of_shapes, of_errors = [prior.size for prior in priors], [off.shape[1] for off in factors]
     shapes, of = np.concatenate(priors), np.concatenate([np.repeat(places, of_shapes), np.repeat(places, of_errors)])
     supposed = []
-    for projected in projections_beside(gram, problem.noise):
+    for projected in _that_count(whole_gram, gram, problem):
         info = projected.info.copy()
         info[np.diag_indices(shapes.size)] -= np.where(np.isinf(shapes), 0.0, shapes**-2.0)  # their priors stand in sd
         for size in criteria.TEMPLATE_ERRORS:

@@ -1,10 +1,10 @@
 """Rows whitened: noise along a run, and gains that scatter from run to run and from curve to curve.
 
-    V = D R D + σ_c² Σ_curves m mᵀ + σ_g² Σ_runs m mᵀ
+    V = D R D + σ_c² Σ_curves m mᵀ + σ_g² Σ_runs m mᵀ + C T² Cᵀ
 
-D holds the deviation of each row, R the correlation of neighbours in a run, w ρ^{|i - j|} off the diagonal, m is the
-predicted torque on the curve's (run's) rows. R is an ARMA(1, 1) process, whitened by its recursive filter; the gains
-are a few directions a run (Woodbury).
+C T are the columns of the law's discrepancy, if there are any (`baseline.law_discrepancy`). D holds the deviation of each
+row, R the correlation of neighbours in a run, w ρ^{|i - j|} off the diagonal, m is the predicted torque on the curve's
+(run's) rows. R is an ARMA(1, 1) process, whitened by its recursive filter; the gains are a few directions a run (Woodbury).
 """
 
 from collections.abc import Callable
@@ -15,6 +15,7 @@ from scipy.sparse import csr_array
 
 from models.arrays import FloatArray
 from models.diagnosis import criteria
+from models.diagnosis.baseline.law_form import EXACT, LawSizes
 from models.diagnosis.design.autocorrelation import Correlation, arma
 from models.diagnosis.design.design import Design, IntArray
 
@@ -28,6 +29,7 @@ class Noise:
     loops: Correlation  # along a loop's bins
     run_gain: float  # relative gain scatter of runs, and of curves [-]
     curve_gain: float
+    law: LawSizes = EXACT  # of its discrepancy
 
 
 def whitened(columns: FloatArray, design: Design, noise: Noise) -> FloatArray:
@@ -96,9 +98,11 @@ def scatter_root(curves: int, run_gain: float, curve_gain: float) -> FloatArray:
     return np.asarray(curve_gain * np.eye(curves) + alike, dtype=np.float64)
 
 
-def whitening(design: Design, torque: FloatArray, noise: Noise) -> Callable[[FloatArray], FloatArray]:
+def whitening(
+    design: Design, torque: FloatArray, noise: Noise, law: FloatArray | None = None
+) -> Callable[[FloatArray], FloatArray]:
     """V^{-1/2} of columns [N, m], gains taken along a torque [N] Nm: (1 + B Bᵀ)^{-1/2} with B = D K^{1/2} of the whitened
-    directions D."""
+    directions D; then in the same way with the columns C T [N, k] Nm of the law's discrepancy."""
     gains = gains_of(design, torque, noise)
     root = scatter_root(gains.overlaps.shape[-1], noise.run_gain, noise.curve_gain)
     sizes, vectors = np.linalg.eigh(root.T @ gains.overlaps @ root)
@@ -110,4 +114,13 @@ def whitening(design: Design, torque: FloatArray, noise: Noise) -> Callable[[Flo
         removed = (shrink @ gains.along(columns)).reshape(-1, columns.shape[1])
         return np.asarray(columns - gains.directions.T @ removed, dtype=np.float64)
 
-    return white
+    if law is None or not law.size:
+        return white
+    directions, lengths, _ = np.linalg.svd(white(law), full_matrices=False)
+    lost = (1.0 - 1.0 / np.hypot(1.0, lengths))[:, None]
+
+    def beside_law(columns: FloatArray) -> FloatArray:
+        columns = white(columns)
+        return np.asarray(columns - directions @ (lost * (directions.T @ columns)), dtype=np.float64)
+
+    return beside_law

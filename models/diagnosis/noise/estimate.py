@@ -9,7 +9,9 @@ piece that nothing smooth reaches and R(w, ρ) the correlation of its rows,
 
     log L(w, ρ) = -½ (m ln s² + Σ_pieces ln |Aᵀ R A|),     s² = Σ xᵀ (Aᵀ R A)⁻¹ x/m,    x = Aᵀ residual,   m values in all
 
-What the model gets wrong is smooth along a curve; the contrasts do not see it, so it is not mistaken for noise. Where it is
+What the model gets wrong is smooth along a curve; the contrasts do not see it, so it is not mistaken for noise. What all
+tests at one pressure and speed have in common, relative to their torque, is the law's and no noise, however sharp it is: its
+median is taken off before. Where it is
 sharp (traction that drops to nothing within a few rows at rest), short pieces of the curves show far less than whole ones:
 then they are taken, without those that hold the drop. Curves of few speeds are no curves: the same point from state to state
 is one there. A deviation sent along is not used: rigs misjudge it, and the data show it as well. How far repeated runs
@@ -194,7 +196,7 @@ def first_noise(design: Design) -> Noise:
 
 def estimate_noise(design: Design, residual: FloatArray, torque: FloatArray, before: Noise) -> tuple[Noise, bool]:
     """The noise in residual [N] Nm about torque [N] Nm, and whether it had to be assumed for plateaus or for loops."""
-    deviation = before.deviation.copy()
+    deviation, residual = before.deviation.copy(), unlike(design, residual, torque)
     correlations, assumed = [], False
     steady = np.arange(residual.size) < design.plateaus
     for part in (steady, ~steady):
@@ -225,6 +227,27 @@ def estimate_noise(design: Design, residual: FloatArray, torque: FloatArray, bef
     if spiky.mean() < 0.02:  # fewer are spikes
         deviation = np.where(spiky, np.abs(residual), deviation)
     return replace(before, deviation=deviation, plateaus=correlations[0], loops=correlations[1]), assumed
+
+
+def unlike(design: Design, residual: FloatArray, torque: FloatArray) -> FloatArray:
+    """The residual [N] Nm without what tests at one pressure and speed have in common, of which there are LEAST_REPEATS or
+    more, as large as before it was taken off where there is noise alone."""
+    rows = np.flatnonzero(design.closed & design.rows.steady & (np.abs(torque) > 0.0))
+    if not rows.size:
+        return residual
+    speed = np.round(design.rows.velocity[rows] / max(float(design.rows.velocity.max()), 1e-300), 3)
+    _, place, count = np.unique(
+        np.stack([design.level[rows], speed], axis=1), axis=0, return_inverse=True, return_counts=True
+    )
+    relative, order = residual[rows] / torque[rows], np.argsort(place, kind="stable")
+    common = np.array([np.median(alike) for alike in np.split(relative[order], np.cumsum(count)[:-1])])
+    repeats = count >= criteria.LEAST_REPEATS
+    off = (relative - np.where(repeats, common, 0.0)[place]) * torque[rows]
+    out = residual.copy()
+    # a median of n normal values has π/(2n + 2.5) of their variance and 1/n in common with each: within 4 % of what is left
+    left = np.where(repeats, 1.0 - 2.0 / count + np.pi / (2.0 * count + 2.5), 1.0)
+    out[rows] = off / np.sqrt(left)[place]
+    return out
 
 
 def _free(pieces: Sequence[Piece]) -> int:

@@ -1,6 +1,8 @@
-"""The baseline of a campaign: the pooled fit without effects, and the noise that its residuals show, in turns.
+"""The baseline of a campaign: the pooled fit without effects, the sizes of the law's discrepancy, and the noise that its
+residuals show, in turns.
 
-It starts from the curves of a few states fitted one by one, and laws fitted through their parameters.
+It starts from the curves of a few states fitted one by one, and laws fitted through their parameters. About the fit of
+eq. 3 alone the law's discrepancy is linearised; from there on every fit is one of both.
 """
 
 from collections.abc import Sequence
@@ -12,10 +14,13 @@ import numpy as np
 from models.arrays import FloatArray
 from models.degradation.general_order import progress_fraction
 from models.diagnosis import criteria
+from models.diagnosis.baseline.law_discrepancy import law_discrepancy
+from models.diagnosis.baseline.law_form import LawSizes
 from models.diagnosis.baseline.laws import (
     ATTRACTOR,
     BLOCK,
     COURSE,
+    DRIFT,
     ENDS,
     FALL,
     KAPPA,
@@ -32,8 +37,15 @@ from models.diagnosis.baseline.prediction import frame_of
 from models.diagnosis.design.design import Design
 from models.diagnosis.noise.estimate import estimate_noise, first_noise
 from models.diagnosis.pooled_fit.gauss_newton import STEPS, Fit, FitStatus, fit
-from models.diagnosis.pooled_fit.problem import FitProblem, priors_of
-from models.diagnosis.pooled_fit.projection import gram_of, likely_curve_gain
+from models.diagnosis.pooled_fit.problem import FitProblem, LawTerms, priors_of
+from models.diagnosis.pooled_fit.projection import (
+    GAINS,
+    gram_of,
+    law_torque,
+    learned_law,
+    likely_curve_gain,
+    projections_of,
+)
 from models.friction.identification import fit_curves
 from models.friction.stribeck import GAMMA
 from models.records.runs import Curve
@@ -154,10 +166,12 @@ class IndeterminateError(Exception):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Baseline:
-    """The pooled fit without effects, its problem (with the noise estimated), and notes for the report."""
+    """The pooled fit without effects, its problem (with the noise and the law's sizes estimated), the fit of eq. 3 taken for
+    exact under the same noise, and notes for the report."""
 
     problem: FitProblem
     fit: Fit
+    exact: Fit
     notes: tuple[str, ...]
 
 
@@ -191,13 +205,38 @@ def _with_its_noise(problem: FitProblem, fitted: Fit) -> Baseline:
     """A fit followed to its end under the noise that its residuals show."""
     noise, assumed = estimate_noise(problem.design, fitted.residual, fitted.torque, problem.noise)
     problem = replace(problem, noise=noise, fitted=fitted.torque)
-    fitted = fit(problem, fitted.laws)
+    exact = fitted = fit(problem, fitted.laws)
     _require_weights(problem, fitted)
-    curve_gain = likely_curve_gain(gram_of(problem, fitted))
-    if curve_gain > 0.0:
-        problem = problem.with_noise(replace(problem.noise, curve_gain=curve_gain))
+    known = set[LawSizes]()
+    for turn in range(criteria.MOST_TURNS):
+        # twice: the law lags by the C that was fitted beside it; eq. 3 alone may have it wrong by a factor of two
+        if turn < 2:
+            discrepancy = law_discrepancy(problem.design, _lagging_as(exact.laws, fitted.laws))
+            problem = replace(problem, law=LawTerms(discrepancy, discrepancy.columns(problem.design)))
+        gram = gram_of(problem, fitted)
+        noise = max(projections_of(gram, problem.noise, GAINS[::2]), key=lambda one: one.evidence).noise(problem.noise)
+        noise = replace(noise, run_gain=problem.noise.run_gain, curve_gain=likely_curve_gain(gram, noise.law))
+        problem = problem.with_noise(noise)
         fitted = fit(problem, fitted.laws)
-    return Baseline(problem=problem, fit=fitted, notes=_notes(problem.design, assumed))
+        if noise.law in known:
+            break
+        known.add(noise.law)
+        residual = fitted.residual - law_torque(problem, fitted)
+        noise, assumed = estimate_noise(problem.design, residual, fitted.torque, noise)
+        problem = replace(problem, noise=noise, fitted=fitted.torque)
+        fitted = fit(problem, fitted.laws)
+        _require_weights(problem, fitted)
+    exact = fit(problem.exact, exact.laws)
+    # effects that read the law at another pressure, speed or state read it as it was found
+    fitted = fit(problem, replace(fitted.laws, learned=learned_law(problem, fitted)))
+    return Baseline(problem=problem, fit=fitted, exact=exact, notes=_notes(problem.design, assumed))
+
+
+def _lagging_as(laws: Laws, other: Laws) -> Laws:
+    """Laws with the C of other laws."""
+    theta = laws.theta.copy()
+    theta[KAPPA], theta[DRIFT:ATTRACTOR] = other.theta[KAPPA], other.theta[DRIFT:ATTRACTOR]
+    return replace(laws, theta=theta)
 
 
 def _require_weights(problem: FitProblem, fitted: Fit) -> None:

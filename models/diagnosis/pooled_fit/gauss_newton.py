@@ -7,10 +7,9 @@ A refit is a fit that is followed to its end, with effects or beside a pattern t
 """
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import TypeAlias
 
 import numpy as np
 
@@ -21,14 +20,11 @@ from models.diagnosis.baseline.prediction import Prediction, predict
 from models.diagnosis.design.design import Design
 from models.diagnosis.effects.effect import SCALES
 from models.diagnosis.effects.fitted_effect import FittedEffect, law_columns
-from models.diagnosis.noise.covariance import whitening
-from models.diagnosis.pooled_fit.problem import FitProblem, Priors
+from models.diagnosis.pooled_fit.problem import FitProblem, Priors, Whiten
 
 #: Gauss-Newton steps where the caller asks for no other number, and damped trials for each.
 STEPS = 30
 _LARGEST_STEP = 1.5
-#: Columns [N, m] with noise and gains whitened.
-Whiten: TypeAlias = Callable[[FloatArray], FloatArray]
 
 
 class FitStatus(StrEnum):
@@ -64,7 +60,7 @@ def fit(problem: FitProblem, start: Laws, effects: Sequence[FittedEffect] = (), 
 
     Gains are taken along one torque (`FitProblem.gained`), which keeps the metric fixed while a fit moves.
     """
-    white, priors = whitening(problem.design, problem.gained, problem.noise), problem.priors
+    white, priors = problem.whitening(), problem.priors
     state = _evaluated(problem, white, start, tuple(effects))
     damping, growth = 1e-3, 2.0
     status = FitStatus.OUT_OF_STEPS
@@ -196,7 +192,7 @@ def _moved(state: Fit, priors: Priors, step: FloatArray) -> tuple[Laws, tuple[Fi
             shape[index] = float(np.clip(shape[index] + step[at], parameter.lowest, parameter.highest))
             at += 1
         effects.append(FittedEffect(effect=fitted.effect, amplitude=size, shape=tuple(shape)))
-    return Laws(theta=theta, frame=state.laws.frame), tuple(effects)
+    return replace(state.laws, theta=theta), tuple(effects)
 
 
 #: Gauss-Newton steps at most: a refit is followed to its end. With 10, a running-in was 49 nats short of it and stood behind
@@ -240,7 +236,7 @@ def _upright(laws: Laws) -> Laws:
     """Laws with every fresh value above 0. Where an effect bends curves, the baseline alone follows with a C_v < 0, and a
     refit with the effect does not come back: the share that a value loses has no bound where the value passes through 0, and
     its prior is a wall. A heating of 15 % beside a measured plate ended 558 nats above its least cost."""
-    turned = Laws(theta=laws.theta.copy(), frame=laws.frame)
+    turned = replace(laws, theta=laws.theta.copy())
     for block, ends in zip(turned.theta[:LOG_DECAY].reshape(BLOCKS, BLOCK), _ends(turned), strict=True):
         if np.any(ends < 0.0):
             ends[ends < 0.0] = 0.25 * np.abs(ends).max()

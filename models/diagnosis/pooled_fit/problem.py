@@ -5,16 +5,20 @@ Priors are weak, scaled by the data, and rows of the least-squares problem like 
     ½ |R θ - m|²,     one row for each parameter, and one for each law whose two shares are expected to drift alike
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
 from models.diagnosis import criteria
+from models.diagnosis.baseline.law_discrepancy import LawDiscrepancy
+from models.diagnosis.baseline.law_form import EXACT, LawSizes
 from models.diagnosis.baseline.laws import ATTRACTOR, BLOCK, DRIFT, FALL, KAPPA, LOG_DECAY, OPEN_DRAG, SHARES, Frame
 from models.diagnosis.design.design import Design
-from models.diagnosis.noise.covariance import Noise
+from models.diagnosis.noise.covariance import Noise, whitening
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,6 +73,23 @@ def _free(design: Design, size: int) -> NDArray[np.bool_]:
     return free
 
 
+@dataclass(frozen=True, slots=True)
+class LawTerms:
+    """The law's discrepancy at the rows of a design."""
+
+    discrepancy: LawDiscrepancy
+    columns: FloatArray  # [N, k] Nm per unit coefficient
+
+    def scaled(self, sizes: LawSizes) -> FloatArray:
+        """C T [N, k] Nm: the columns times the coefficients' deviations, without those that are 0."""
+        deviations = self.discrepancy.form.deviations(sizes)
+        return self.columns[:, deviations > 0.0] * deviations[deviations > 0.0]
+
+
+#: Turns columns [N, m] into their whitened form.
+Whiten: TypeAlias = Callable[[FloatArray], FloatArray]
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FitProblem:
     """A least-squares problem."""
@@ -77,6 +98,7 @@ class FitProblem:
     noise: Noise  # their covariance
     priors: Priors
     fitted: FloatArray | None = None  # the torque [N] Nm of a fit, None before there is one
+    law: LawTerms | None = None  # the law's discrepancy, None while eq. 3 is taken for exact
 
     @property
     def gained(self) -> FloatArray:
@@ -90,3 +112,13 @@ class FitProblem:
     def with_noise(self, noise: Noise) -> "FitProblem":
         """The problem with its rows and priors under another noise."""
         return replace(self, noise=noise)
+
+    @property
+    def exact(self) -> "FitProblem":
+        """The problem with the law taken for exact."""
+        return replace(self, law=None, noise=replace(self.noise, law=EXACT))
+
+    def whitening(self, noise: Noise | None = None) -> Whiten:
+        """V^{-1/2} of the problem's noise, or of another one."""
+        noise = noise or self.noise
+        return whitening(self.design, self.gained, noise, None if self.law is None else self.law.scaled(noise.law))

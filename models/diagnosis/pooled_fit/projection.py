@@ -14,66 +14,162 @@ absorb are no evidence of a small scatter), summed over σ_c, gives the scatter 
 
 with p_0 the prior of `criteria`. What data say beyond it is I = Σ p ln(p/p_0) nats; where that is less than
 LEAST_SCATTER_INFORMATION the estimate is the prior, and said to be.
+
+The coefficients of the law's discrepancy are integrated out in the same way, with priors of any sizes τ (`LawSizes`): all
+else that is free is projected off first, once for each scatter of the gains, and of each size only the k columns of the law
+are projected off what is left. What remains of a change's information beside the law, as a share of what there is of it
+beside the exact law, is its isolability
+
+    ι = info(τ)/info(0).
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.interpolate import CubicSpline
+from scipy.linalg import solve_triangular
 from scipy.special import log_softmax, logsumexp
 
 from models.arrays import FloatArray
 from models.diagnosis import criteria
+from models.diagnosis.baseline.law_discrepancy import LawDiscrepancy, sizes_considered
+from models.diagnosis.baseline.law_form import EXACT, LawSizes, LearnedLaw
 from models.diagnosis.noise.covariance import Noise, gains_of, scatter_root, whitened
 from models.diagnosis.pooled_fit.gauss_newton import Fit, prior_gram, sensitivities
 from models.diagnosis.pooled_fit.problem import FitProblem
+from models.gaussian_evidence import independent, log_sum
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Crossed:
+    """Columns [s] that are only screened, one by one: their inner products with the others and with themselves."""
+
+    cross: FloatArray  # [m, s]
+    squares: FloatArray  # [s]
+    along: FloatArray  # [R, k, s]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Gram:
-    """Inner products of whitened columns [m], the first `base` of them the baseline's, the last the residual."""
+    """Inner products of whitened columns [m]: first the `laws` columns of the law's discrepancy, then what else the baseline
+    has free, `base` of both together, then changes; the last is the residual."""
 
     matrix: FloatArray  # [m, m] without gains
     along: FloatArray  # [R, k, m] along the directions of the curves of each run (`noise.covariance.Gains`)
     overlaps: FloatArray  # [R, k, k]
     base: int
+    law: LawDiscrepancy | None = None
+    laws: int = 0
+    screened: Crossed | None = None
 
-    def with_gains(self, run_gain: float, curve_gain: float) -> tuple[FloatArray, float]:
-        """The matrix with gains that scatter so, and the log determinant of what they add [nats, twice]."""
+    def reduced(self, run_gain: float, curve_gain: float) -> "Reduced":
+        """What is left once the gains, scattering so, and all that the baseline has free but the law are taken off."""
         root = scatter_root(self.overlaps.shape[-1], run_gain, curve_gain)
         factor = np.linalg.cholesky(np.eye(root.shape[1]) + root.T @ self.overlaps @ root)
         removed = np.linalg.solve(factor, root.T @ self.along).reshape(-1, self.matrix.shape[1])
-        added = 2.0 * np.log(np.diagonal(factor, axis1=1, axis2=2)).sum()
-        return self.matrix - removed.T @ removed, float(added)
+        full = self.matrix - removed.T @ removed
+        free = slice(self.laws, self.base)
+        left = np.r_[0 : self.laws, self.base : full.shape[0]]
+        factored = _Factored.of(full[free, free], 1e-11)
+        half = factored.solve(full[free][:, left])
+        reduced = Reduced(
+            gram=self,
+            matrix=full[np.ix_(left, left)] - half.T @ half,
+            whole=np.diag(full)[self.base : -1],
+            constant=-float(np.log(np.diagonal(factor, axis1=1, axis2=2)).sum()),
+            freedom=-0.5 * factored.log_determinant,
+            run_gain=run_gain,
+            curve_gain=curve_gain,
+        )
+        if (screened := self.screened) is None:
+            return reduced
+        of_screened = np.linalg.solve(factor, root.T @ screened.along).reshape(-1, screened.squares.size)
+        cross = screened.cross - removed.T @ of_screened
+        squares = screened.squares - np.square(of_screened).sum(axis=0)
+        own = factored.solve(cross[free])
+        return replace(
+            reduced,
+            cross=cross[left] - half.T @ own,
+            squares=squares - np.square(own).sum(axis=0),
+            screened_whole=squares,
+        )
 
-    def covariance(self, run_gain: float, curve_gain: float) -> FloatArray:
-        """[base, base] of all that the baseline has free, with gains that scatter so."""
-        corner = self.with_gains(run_gain, curve_gain)[0][: self.base, : self.base]
+    def covariance(self, noise: Noise, *, exact: bool = False) -> FloatArray:
+        """[base - laws, base - laws] of all that the baseline has free beside the law, with a noise's gains and sizes of the
+        law, or with the `exact` law."""
+        sizes = EXACT if exact else noise.law
+        given = replace(self, base=self.laws, screened=None).reduced(noise.run_gain, noise.curve_gain)
+        count = self.base - self.laws
+        corner = given.beside_law(sizes).info[:count, :count]
         scale = 1 / np.sqrt(np.maximum(np.diag(corner), 1e-300))
         inverse = np.linalg.pinv(corner * scale[:, None] * scale, hermitian=True)
         return np.asarray(inverse * scale[:, None] * scale, dtype=np.float64)
 
 
-def gram_of(problem: FitProblem, fit: Fit, changes: FloatArray | None = None, *, exact: bool = True) -> Gram:
-    """The Gram matrix of a fit (its effects belong to the baseline then) and changes [N, m] at the rows, none if None.
-    Where templates are not `exact` their discrepancies belong to the baseline too."""
+@dataclass(frozen=True, slots=True)
+class _Factored:
+    """A Cholesky factor of a positive matrix [b, b] that was scaled to ones on its diagonal."""
+
+    factor: FloatArray
+    scale: FloatArray
+
+    @classmethod
+    def of(cls, matrix: FloatArray, ridge: float) -> "_Factored":
+        """A correlation matrix may be singular to rounding: more of a ridge than rounding would change determinants."""
+        scale = 1 / np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+        factor = np.linalg.cholesky(matrix * scale[:, None] * scale + ridge * np.eye(scale.size))
+        return cls(np.asarray(factor, dtype=np.float64), scale)
+
+    def solve(self, columns: FloatArray) -> FloatArray:
+        """L⁻¹ of columns [b, n]."""
+        if not self.scale.size:
+            return columns
+        solved = solve_triangular(self.factor, columns * self.scale[:, None], lower=True, check_finite=False)
+        return np.asarray(solved, dtype=np.float64)
+
+    @property
+    def log_determinant(self) -> float:
+        """Of the matrix [nats]."""
+        return 2.0 * float(np.log(np.diag(self.factor)).sum() - np.log(self.scale).sum())
+
+
+def gram_of(
+    problem: FitProblem,
+    fit: Fit,
+    changes: FloatArray | None = None,
+    *,
+    screened: FloatArray | None = None,
+    exact: bool = True,
+) -> Gram:
+    """The Gram matrix of a fit (its effects belong to the baseline then) and changes [N, m] at the rows, none if None, with
+    columns [N, s] that are only `screened`. Templates that are not `exact` have their discrepancies in the baseline too."""
     design, noise = problem.design, problem.noise
-    changes = np.zeros((design.torque.size, 0)) if changes is None else changes
+    nothing = np.zeros((design.torque.size, 0))
+    law = nothing if problem.law is None else problem.law.columns
     jacobian = sensitivities(problem, fit)
     off = [] if exact else [effect.discrepancy_columns(design, fit.prediction) for effect in fit.effects]
-    white = whitened(np.column_stack([jacobian, *off, changes, fit.residual]), design, noise)
+    columns = [law, jacobian, *off, nothing if changes is None else changes, fit.residual]
+    white = whitened(np.column_stack(columns), design, noise)
     gains = gains_of(design, fit.torque, noise)
-    matrix = white.T @ white
-    effect_parts = np.append(np.arange(jacobian.shape[1]), -1)
+    matrix, laws = white.T @ white, law.shape[1]
+    effect_parts = np.append(laws + np.arange(jacobian.shape[1]), -1)
     matrix[np.ix_(effect_parts, effect_parts)] += prior_gram(problem.priors, fit)
-    loose = jacobian.shape[1] + np.arange(sum(columns.shape[1] for columns in off))
+    loose = laws + jacobian.shape[1] + np.arange(sum(columns.shape[1] for columns in off))
     matrix[loose, loose] += criteria.DISCREPANCY_SD**-2.0
+    crossed = None
+    if screened is not None:
+        seen = whitened(screened, design, noise)
+        squares = np.einsum("ns,ns->s", seen, seen)
+        crossed = Crossed(cross=white.T @ seen, squares=squares, along=gains.along(seen))
     return Gram(
         matrix=matrix,
         along=gains.along(white),
         overlaps=gains.overlaps,
-        base=jacobian.shape[1] + loose.size,
+        base=laws + jacobian.shape[1] + loose.size,
+        law=None if problem.law is None else problem.law.discrepancy,
+        laws=laws,
+        screened=crossed,
     )
 
 
@@ -82,63 +178,161 @@ GAINS: FloatArray = np.geomspace(criteria.LEAST_GAIN, criteria.MOST_GAIN, 13)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Screened:
+    """Of columns [s] that are screened one by one."""
+
+    info: FloatArray  # [s]
+    score: FloatArray  # [s]
+    whole: FloatArray  # [s] what info would be if the baseline absorbed nothing of them
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Projected:
-    """What is left of changes [m] once the baseline is projected off, at one scatter of the gains."""
+    """What is left of changes [m] once the baseline and the law's discrepancy are projected off, at one scatter of the gains
+    and one size of the discrepancy."""
 
     info: FloatArray  # [m, m]
     score: FloatArray  # [m]
     whole: FloatArray  # [m] what info's diagonal would be if the baseline absorbed nothing of them
     miss: float  # rᵀV⁻¹(1 - P)r
-    evidence: float  # of the gains' scatter [nats]
+    evidence: float  # of the gains' scatter and of the law's sizes [nats]
     profile: float  # the same without the determinant of what is fitted
     run_gain: float
     curve_gain: float
+    sizes: LawSizes
+    log_weight: float  # of the sizes' prior [nats]
+    screened: Screened | None = None
 
     def noise(self, noise: Noise) -> Noise:
-        """The noise with this scatter of the gains."""
-        return replace(noise, run_gain=self.run_gain, curve_gain=self.curve_gain)
+        """The noise with this scatter of the gains and these sizes."""
+        return replace(noise, run_gain=self.run_gain, curve_gain=self.curve_gain, law=self.sizes)
 
 
-def projections_of(gram: Gram, noise: Noise) -> Iterator[Projected]:
-    """With every scatter of the gains that is considered, one after the other: of the runs' gains, and of the curves' up to
-    what the noise has or next above. Where the data ask for none of the latter without an effect, they do not with one."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Reduced:
+    """What is left of the law's columns [k], the changes [m] and the residual at one scatter of the gains, the baseline but
+    for the law projected off; of screened columns [s] likewise."""
+
+    gram: Gram
+    matrix: FloatArray  # [k + m + 1, k + m + 1]
+    whole: FloatArray  # [m]
+    constant: float  # -½ ln det of what gains add [nats]
+    freedom: float  # -½ ln det of what is fitted [nats]
+    run_gain: float
+    curve_gain: float
+    cross: FloatArray | None = None  # [k + m + 1, s]
+    squares: FloatArray | None = None  # [s]
+    screened_whole: FloatArray | None = None  # [s]
+
+    def beside_law(self, sizes: LawSizes, log_weight: float = 0.0) -> Projected:
+        """With the law off by such sizes, of a log prior."""
+        gram, laws = self.gram, self.gram.laws
+        deviations = gram.law.form.deviations(sizes) if gram.law is not None else np.zeros(0)
+        used = np.flatnonzero(deviations > 0.0)
+        scaled = self.matrix[used] * deviations[used, None]
+        law = scaled[:, used] * deviations[used]
+        factored = _Factored.of(law + np.eye(used.size), 0.0)
+        half = factored.solve(scaled[:, laws:])
+        left = self.matrix[laws:, laws:] - half.T @ half
+        miss = float(left[-1, -1])
+        # a controller that comes back to 0.005 bar makes 0.1 %
+        prior = log_gain_prior(self.run_gain) - float(np.log1p((self.curve_gain / 1e-3) ** 2)) + log_weight
+        profile = -0.5 * (miss + factored.log_determinant) + self.constant + prior
+        screened = None
+        if self.cross is not None and self.squares is not None and self.screened_whole is not None:
+            own = factored.solve(self.cross[used] * deviations[used, None])
+            screened = Screened(
+                info=np.maximum(self.squares - np.square(own).sum(axis=0), 0.0),
+                score=self.cross[-1] - half[:, -1] @ own,
+                whole=self.screened_whole,
+            )
+        return Projected(
+            info=left[:-1, :-1],
+            score=left[:-1, -1],
+            whole=self.whole,
+            miss=miss,
+            evidence=profile + self.freedom,
+            profile=profile,
+            run_gain=self.run_gain,
+            curve_gain=self.curve_gain,
+            sizes=sizes,
+            log_weight=log_weight,
+            screened=screened,
+        )
+
+    def law_coefficients(self, sizes: LawSizes) -> tuple[FloatArray, FloatArray]:
+        """Mean [k] and root [k, j] of the covariance of the law's coefficients, all else that is free integrated out."""
+        laws = self.gram.laws
+        deviations = self.gram.law.form.deviations(sizes) if self.gram.law is not None else np.zeros(0)
+        values, vectors = independent(deviations[:, None] * self.matrix[:laws, :laws] * deviations)
+        root = deviations[:, None] * vectors / np.sqrt(1.0 + values)
+        return root @ (root.T @ self.matrix[:laws, -1]), root
+
+
+def likely_sizes(reduced: Reduced) -> dict[LawSizes, float]:
+    """The sizes of the law that count at a scatter of the gains, with their log priors, likeliest first: those of more than
+    NEGLIGIBLE_SIZES of the posterior, and of each size's values the best, for beside a change another may be likelier."""
+    if reduced.gram.law is None:
+        return {EXACT: 0.0}
+    alone = np.r_[0 : reduced.gram.laws, -1]
+    bare = replace(reduced, matrix=reduced.matrix[np.ix_(alone, alone)], whole=np.zeros(0), cross=None)
+    known = sizes_considered()
+    logs = np.array([bare.beside_law(sizes, log_weight).evidence for sizes, log_weight in known])
+    ranked = [known[place] for place in np.argsort(-logs, kind="stable")]
+    likely = int(np.count_nonzero(logs > log_sum(logs) + np.log(criteria.NEGLIGIBLE_SIZES)))
+    kept = dict(ranked[: max(likely, 1)])
+    for axis in range(len(EXACT)):
+        seen = {sizes[axis] for sizes in kept}
+        for sizes, log_weight in ranked:
+            if sizes[axis] not in seen:
+                kept[sizes] = log_weight
+                seen.add(sizes[axis])
+    return kept
+
+
+def projections_of(gram: Gram, noise: Noise, gains: FloatArray | None = None) -> list[Projected]:
+    """With every scatter of the gains that is considered (of the runs' gains: `gains`; of the curves' up to what the noise
+    has or next above: where the data ask for none without an effect, they do not with one) and the law's likely sizes."""
     place = int(np.searchsorted(criteria.CURVE_GAINS, noise.curve_gain))  # 0 for none
     curves = criteria.CURVE_GAINS[: place + 2 if place else 1]
-    return (project(gram, gain, curve) for curve in curves for gain in GAINS.tolist())
+    return _projections(gram, noise, curves, GAINS if gains is None else gains)
 
 
-def likely_curve_gain(gram: Gram) -> float:
-    """The likeliest scatter of the curves' gains; none where another is not clearly likelier."""
-    best = [max(project(gram, gain, curve).evidence for gain in GAINS.tolist()) for curve in criteria.CURVE_GAINS]
+def projections_beside(gram: Gram, noise: Noise) -> list[Projected]:
+    """At every second scatter of the runs' gains, with the curves' as estimated without an effect and with none (an effect
+    may be what made them scatter), and at the law's likely sizes."""
+    return _projections(gram, noise, sorted({noise.curve_gain, 0.0}), GAINS[::2])
+
+
+def _projections(gram: Gram, noise: Noise, curves: Sequence[float], gains: FloatArray) -> list[Projected]:
+    reduced = [gram.reduced(gain, curve) for curve in curves for gain in gains.tolist()]
+    best = max(reduced, key=lambda one: one.beside_law(noise.law).evidence)
+    sizes = likely_sizes(best)
+    return [one.beside_law(size, log_weight) for size, log_weight in sizes.items() for one in reduced]
+
+
+def likely_curve_gain(gram: Gram, sizes: LawSizes) -> float:
+    """The likeliest scatter of the curves' gains beside the law's sizes; none where another is not clearly likelier."""
+    best = [
+        max(project(gram, gain, curve, sizes).evidence for gain in GAINS.tolist()) for curve in criteria.CURVE_GAINS
+    ]
     likeliest = int(np.argmax(best))
     return criteria.CURVE_GAINS[likeliest] if best[likeliest] > best[0] + criteria.LEAST_CURVE_GAIN_EVIDENCE else 0.0
 
 
-def project(gram: Gram, run_gain: float, curve_gain: float) -> Projected:
-    """With the runs' gains scattering by `run_gain`, those of the curves by `curve_gain` besides."""
-    full, added = gram.with_gains(run_gain, curve_gain)
-    base = gram.base
-    corner = full[:base, :base]
-    scale = 1 / np.sqrt(np.maximum(np.diag(corner), 1e-300))
-    # a correlation matrix may be singular to rounding: where it is none more would change determinants unseen
-    factor = np.linalg.cholesky(corner * scale[:, None] * scale + 1e-11 * np.eye(base))
-    half = np.linalg.solve(factor, full[:base, base:] * scale[:, None])
-    left = full[base:, base:] - half.T @ half
-    fitted = float(np.log(np.diag(factor)).sum() - np.log(scale).sum())
-    miss = float(left[-1, -1])
-    # a controller that comes back to 0.005 bar makes 0.1 %
-    prior = log_gain_prior(run_gain) - float(np.log1p((curve_gain / 1e-3) ** 2))
-    profile = -0.5 * (miss + added) + prior
-    return Projected(
-        info=left[:-1, :-1],
-        score=left[:-1, -1],
-        whole=np.diag(full)[base:-1],
-        miss=miss,
-        evidence=profile - fitted,
-        profile=profile,
-        run_gain=run_gain,
-        curve_gain=curve_gain,
-    )
+def project(gram: Gram, run_gain: float, curve_gain: float, sizes: LawSizes = EXACT) -> Projected:
+    """With the runs' gains scattering by `run_gain`, those of the curves by `curve_gain`, the law off by such sizes."""
+    return gram.reduced(run_gain, curve_gain).beside_law(sizes)
+
+
+def isolability(problem: FitProblem, fit: Fit, changes: FloatArray, sizes: LawSizes) -> FloatArray:
+    """ι [m] of changes [N, m] beside the law's sizes, at the noise's scatter of the gains."""
+    reduced = gram_of(problem, fit, screened=changes).reduced(problem.noise.run_gain, problem.noise.curve_gain)
+    beside, exact = (reduced.beside_law(size).screened for size in (sizes, EXACT))
+    if beside is None or exact is None:
+        raise AssertionError("columns that were given are screened")
+    shown = exact.info > 1e-9 * exact.whole  # the rest is rounding
+    return np.where(shown, beside.info / np.where(shown, exact.info, 1.0), 0.0)
 
 
 def log_gain_prior(run_gain: float) -> float:
@@ -149,8 +343,7 @@ def log_gain_prior(run_gain: float) -> float:
 
 def amplitude_deviations(problem: FitProblem, fitted: Fit) -> list[float]:
     """Standard deviations of the amplitudes of the fit's effects, everything else free."""
-    gram = gram_of(problem, fitted, exact=False)
-    inverse = gram.covariance(problem.noise.run_gain, problem.noise.curve_gain)
+    inverse = gram_of(problem, fitted, exact=False).covariance(problem.noise)
     sizes = [0, *(effect.precisions.size for effect in fitted.effects[:-1])]
     places = int(problem.priors.free.sum()) + np.cumsum(sizes)[: len(fitted.effects)]
     return [float(np.sqrt(max(inverse[place, place], 0.0))) for place in places]
@@ -188,7 +381,7 @@ def run_scatter(projections: Sequence[Projected]) -> RunScatter:
 
 def without_likely_gains(problem: FitProblem, fitted: Fit) -> FloatArray:
     """The residual [N] Nm less what the likeliest gains of runs and curves make of it: r - M ĝ with the best linear
-    prediction ĝ = K Mᵀ V⁻¹ r."""
+    prediction ĝ = K Mᵀ V⁻¹ r, the law taken for exact."""
     noise = problem.noise
     gains = gains_of(problem.design, fitted.torque, noise)
     white = whitened(fitted.residual[:, None], problem.design, noise)
@@ -196,3 +389,29 @@ def without_likely_gains(problem: FitProblem, fitted: Fit) -> FloatArray:
     scattered = np.eye(root.shape[1]) + root.T @ gains.overlaps @ root
     likeliest = root @ np.linalg.solve(scattered, root.T @ gains.along(white))
     return np.asarray(fitted.residual - fitted.torque * likeliest.ravel()[gains.curve], dtype=np.float64)
+
+
+def learned_law(problem: FitProblem, fitted: Fit) -> LearnedLaw | None:
+    """The likeliest discrepancy of the law in a fit's residual r, at the noise's sizes: T (1 + Bᵀ B)⁻¹ Bᵀ V^{-1/2} r with B
+    the columns C T whitened beside noise and gains; None where the law is exact."""
+    if problem.law is None or problem.noise.law == EXACT:
+        return None
+    deviations = problem.law.discrepancy.form.deviations(problem.noise.law)
+    columns = np.column_stack([problem.law.columns * deviations, fitted.residual])
+    white = problem.whitening(replace(problem.noise, law=EXACT))(columns)
+    beside, residual = white[:, :-1], white[:, -1]
+    coefficients = np.linalg.solve(np.eye(deviations.size) + beside.T @ beside, beside.T @ residual)
+    return LearnedLaw(form=problem.law.discrepancy.form, coefficients=deviations * coefficients)
+
+
+def law_torque(problem: FitProblem, fitted: Fit) -> FloatArray:
+    """The likeliest discrepancy of the law [N] Nm at the rows."""
+    learned = learned_law(problem, fitted)
+    if learned is None or problem.law is None:
+        return np.zeros(fitted.residual.size)
+    return np.asarray(problem.law.columns @ learned.coefficients, dtype=np.float64)
+
+
+def left_over(problem: FitProblem, fitted: Fit) -> FloatArray:
+    """The residual [N] Nm less what the likeliest discrepancy of the law and the likeliest gains make of it."""
+    return without_likely_gains(problem, replace(fitted, residual=fitted.residual - law_torque(problem, fitted)))

@@ -23,6 +23,7 @@ from models.diagnosis.pooled_fit.gauss_newton import Fit, FitStatus
 from models.diagnosis.pooled_fit.problem import FitProblem
 from models.diagnosis.pooled_fit.projection import RunScatter, amplitude_deviations, run_scatter
 from models.diagnosis.raw_records.evidence import RawEvidence
+from models.diagnosis.report.friction_law import FrictionLaw
 from models.diagnosis.report.isolability import unseen_of, visible_of
 from models.diagnosis.report.maps import loop_traces, residual_maps
 from models.diagnosis.report.report import Candidate, Report, misfit_of
@@ -31,7 +32,11 @@ from models.diagnosis.validation.held_out import Gain
 
 
 def candidates_of(
-    problem: FitProblem, judgement: Judgement, raw: Sequence[RawEvidence], sizes: Mapping[str, Size]
+    problem: FitProblem,
+    judgement: Judgement,
+    raw: Sequence[RawEvidence],
+    sizes: Mapping[str, Size],
+    isolability: Mapping[str, float],
 ) -> tuple[Candidate, ...]:
     """Each effect as the verdict has it, else alone, else beside the one that it goes with best."""
     records = {record.effect: record for record in raw}
@@ -65,6 +70,7 @@ def candidates_of(
                 probability=probability,
                 log_evidence_gain=_finite(evidence),
                 estimate=estimate,
+                isolability=isolability.get(slug),
                 beside=() if fitted is None else tuple(other for other in fitted.slugs if other != slug),
                 fit=None if fitted is None else fitted.fit.status,
             )
@@ -103,10 +109,16 @@ def _finite(value: float) -> float:
     return float(np.clip(value, -1e300, 1e300))
 
 
-def reason_against(gain: Gain | None, sizes: Sizes) -> str:
+#: What the paragraph says where causes are open.
+ADOPT_NOTHING = "Adopt nothing before the next diagnosis."
+
+
+def reason_against(verdict: Verdict, gain: Gain | None, sizes: Sizes) -> str:
     """Why an extension is not proposed, or nothing where one is or none was fitted. The verdict stays."""
     if not sizes.draws:
         return ""
+    if verdict is not Verdict.CAUSE_NAMED:
+        return ADOPT_NOTHING
     if gain is not None and (gain.rmse_after > criteria.MOST_WORSE * gain.rmse_before or gain.log_score_gain < 0):
         it = "it" if len(sizes.by_slug) == 1 else "them"
         return f"Do not adopt {it}, even if confirmed: with {it}, the model predicts other runs no better than without."
@@ -134,7 +146,7 @@ def statistics_of(posterior: Posterior, judgement: Judgement, scatter: RunScatte
         "run_scatter_information": scatter.information,
         "probability_nothing": probabilities[NOTHING],
         "log_evidence": posterior.weights[best] - posterior.prior(best),
-        "log_posterior_odds": posterior.weights[best],
+        "log_posterior_odds": posterior.weights[best] - posterior.weights[NOTHING],
         "structure": judgement.where[0].strength if judgement.where else 0.0,
         "refits": float(posterior.refits),
     }
@@ -150,13 +162,14 @@ def report_of(
     gain: Gain | None,
     sizes: Sizes,
     advice: tuple[Advice, ...],
+    law: FrictionLaw | None,
 ) -> Report:
-    """Candidates, misfits, gain, advice, maps, loops, extension, summary."""
+    """Candidates, misfits, gain, advice, maps, loops, the friction law, extension, summary."""
     problem, fitted = posterior.problem, posterior.null.fit
-    reason = reason_against(gain, sizes)
+    reason = reason_against(judgement.verdict, gain, sizes)
     notes = _notes(baseline, posterior, judgement, raw)
     scatter = run_scatter(posterior.null.evidence.screened)
-    candidates = candidates_of(problem, judgement, raw, sizes.by_slug)
+    candidates = candidates_of(problem, judgement, raw, sizes.by_slug, posterior.isolability)
     visible = visible_of(posterior)
     extension = None
     if not reason and any(draw.effects for draw in sizes.draws):
@@ -169,15 +182,21 @@ def report_of(
         causes=judgement.causes,
         explanations=with_signs(judgement.explanations, candidates),
         candidates=candidates,
-        baseline=misfit_of(problem, fitted, judgement.where),
+        baseline=misfit_of(baseline.problem.exact, baseline.exact, judgement.where),
         extended=None if extended is None else misfit_of(problem, extended, judgement.left),
         extended_effects=() if extended is None else tuple(effect.effect.slug for effect in extended.effects),
         gain=gain,
         advice=advice,
         visible=visible,
         unseen=unseen_of(posterior, visible, raw),
-        maps=residual_maps(problem, fitted, extended),
-        loops=loop_traces(problem, fitted, extended),
+        maps=residual_maps(baseline, problem, extended or fitted),
+        loops=loop_traces(baseline, problem, extended or fitted),
+        friction_law=law,
+        like_the_law=tuple(
+            slug
+            for slug, share in sorted(posterior.like_the_law.items(), key=lambda item: -item[1])
+            if share >= criteria.LIKE_MENTIONED and slug in BY_SLUG
+        ),
         extension=extension,
         not_adoptable=reason,
         notes=notes,
@@ -209,6 +228,6 @@ def _notes(
     notes += [f"convergence: the fit with {name} {ended}" for name in unfinished]
     if judgement.verdict in {Verdict.CAUSE_AMBIGUOUS, Verdict.UNEXPLAINED_STRUCTURE}:
         # the first baseline before the better one, whose laws may have bent until an outlying run fits
-        first_note = outlying_run(baseline.problem, baseline.fit)
+        first_note = outlying_run(baseline.problem.exact, baseline.exact)
         notes.append(first_note or outlying_run(posterior.problem, posterior.null.fit))
     return tuple(note for note in notes if note)

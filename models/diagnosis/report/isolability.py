@@ -31,15 +31,16 @@ from scipy.special import ndtri
 from models.arrays import FloatArray
 from models.diagnosis import criteria
 from models.diagnosis.campaign import Campaign
-from models.diagnosis.effects.catalogue import CATALOGUE, Column
+from models.diagnosis.effects.catalogue import CATALOGUE, Column, columns_at_rows
 from models.diagnosis.effects.effect import SCALES, Kind
 from models.diagnosis.effects.fitted_effect import FittedEffect
 from models.diagnosis.experiments.candidates import TRIALS, runs_of
 from models.diagnosis.experiments.information import CandidateDistances
 from models.diagnosis.experiments.test_plan import bare, distinguished, trials_of
-from models.diagnosis.explanations.posterior import Posterior
+from models.diagnosis.explanations.posterior import Posterior, screen_of
 from models.diagnosis.explanations.verdict import Alternative
 from models.diagnosis.pooled_fit.gauss_newton import Fit
+from models.diagnosis.pooled_fit.projection import gram_of, project
 from models.diagnosis.raw_records.evidence import RawEvidence
 from models.diagnosis.report.report import Isolability, Pair, Visible
 
@@ -83,11 +84,11 @@ def amplitudes_of(posterior: Posterior) -> FloatArray:
     paid = np.array([-odds - column.log_weight for column in columns]) + np.log(len(SCALES))
     largest = np.zeros(len(columns))
     for projected in projections:
-        info = np.maximum(np.diag(projected.info), 0.0)
+        info, whole = screen_of(projected).info, screen_of(projected).whole
         freedom = 0.5 * np.min([np.log1p((scale * sd) ** 2 * info) for scale in SCALES], axis=0)
         needed = 0.5 * (np.sqrt(2 * (paid + freedom)) + float(ndtri(criteria.VISIBLE_POWER))) ** 2
         left = np.maximum(needed - best + projected.evidence, 0.0)
-        shown = info > 1e-6 * projected.whole  # the rest is rounding
+        shown = info > 1e-6 * whole  # the rest is rounding
         amplitude = np.sqrt(2 * left / np.where(shown, info, 1.0))
         largest = np.maximum(largest, np.where(shown, amplitude, np.where(left > 0, np.inf, 0.0)))
     return largest
@@ -108,8 +109,9 @@ def isolability_of(campaign: Campaign, posterior: Posterior) -> Isolability:
         if slug in slugs
     }
     visible = {slug: shapes for slug, shapes in grouped.items() if any(np.isfinite(size) for _, size in shapes)}
-    null = posterior.null.fit
-    info = posterior.null.evidence.screened[0].info
+    problem, null = posterior.problem, posterior.null.fit
+    noise, changes = problem.noise, columns_at_rows(problem.design, null.prediction, posterior.columns)
+    info = project(gram_of(problem, null, changes), noise.run_gain, noise.curve_gain, noise.law).info
     place_of = {id(column): place for place, column in enumerate(posterior.columns)}
     likeliest = {}  # the most probable shape in which an effect is seen, and its amplitude [SI] there
     for slug, shapes in visible.items():

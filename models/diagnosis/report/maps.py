@@ -7,9 +7,10 @@ import numpy as np
 
 from models.arrays import FloatArray
 from models.diagnosis.design.design import IntArray
+from models.diagnosis.pooled_fit.baseline_fit import Baseline
 from models.diagnosis.pooled_fit.gauss_newton import Fit
 from models.diagnosis.pooled_fit.problem import FitProblem
-from models.diagnosis.pooled_fit.projection import without_likely_gains
+from models.diagnosis.pooled_fit.projection import left_over
 
 #: Speeds are gathered into at most this many bins, states into as many (resolution of a map).
 MOST_BINS = 24
@@ -43,8 +44,9 @@ class LoopTrace:
     extended: FloatArray
 
 
-def residual_maps(problem: FitProblem, baseline: Fit, extended: Fit | None) -> Maps | None:
-    """Means of residual over noise on plateaus (on loops where there are no plateaus) of the closed clutch; None without."""
+def residual_maps(baseline: Baseline, problem: FitProblem, extended: Fit) -> Maps | None:
+    """Means of residual over noise on plateaus (on loops where there are no plateaus) of the closed clutch, of eq. 3 taken
+    for exact and of the extended model beside the law; None without."""
     design, noise = problem.design, problem.noise
     rows = np.flatnonzero(design.closed & (design.rows.steady | (design.plateaus == 0)))
     if rows.size == 0:
@@ -53,8 +55,8 @@ def residual_maps(problem: FitProblem, baseline: Fit, extended: Fit | None) -> M
     levels, of_level = np.unique(design.level[rows], return_inverse=True)
     speeds, of_speed = _binned(speed)
     cycles, of_cycles = _binned(design.rows.cycles[rows])
-    after = baseline if extended is None else extended
-    white = [without_likely_gains(problem, model)[rows] / noise.deviation[rows] for model in (baseline, after)]
+    models = ((baseline.problem.exact, baseline.exact), (problem, extended))
+    white = [left_over(*model)[rows] / noise.deviation[rows] for model in models]
     maps = {}
     for when, residual in zip(("before", "after"), white, strict=True):
         maps[f"speed_pressure_{when}"] = _means(residual, of_level, of_speed, (levels.size, speeds.size))
@@ -80,7 +82,7 @@ def _means(values: FloatArray, row: IntArray, column: IntArray, shape: tuple[int
     return np.where(count > 0, total / np.maximum(count, 1), np.nan).reshape(shape)
 
 
-def loop_traces(problem: FitProblem, baseline: Fit, extended: Fit | None) -> tuple[LoopTrace, ...]:
+def loop_traces(baseline: Baseline, problem: FitProblem, extended: Fit) -> tuple[LoopTrace, ...]:
     """A few loops, fresh to worn and low to high pressure: a period's bins, as measured and as both models have it."""
     design = problem.design
     number = design.rows.loop
@@ -94,8 +96,8 @@ def loop_traces(problem: FitProblem, baseline: Fit, extended: Fit | None) -> tup
         for loop, state, level in zip(loops, states, levels, strict=True)
         if state in _spread(np.unique(states)) and level in _spread(np.unique(levels))
     ]
-    models = (baseline, baseline if extended is None else extended)
-    before, after = (design.torque - without_likely_gains(problem, model) for model in models)
+    models = ((baseline.problem.exact, baseline.exact), (problem, extended))
+    before, after = (design.torque - left_over(*model) for model in models)
     traces = []
     for loop in chosen:
         rows = np.flatnonzero(number == loop)

@@ -1,7 +1,8 @@
 """What a diagnosis reports: verdict, causes, the misfit and what it depends on, what the extension gains, which test
 decides.
 
-How well a fit does is its error against the noise alone. The scatter of gains is no misfit: each run's gain, and in the
+How well a fit does is its error against the noise alone: the baseline's is that of eq. 3 taken for exact, the extended
+model's that of causes beside the law as it was found. The scatter of gains is no misfit: each run's gain, and in the
 same way each curve's, is taken out of its residual at its best linear prediction,
 
     r - M ĝ,     ĝ = σ_g² Mᵀ V⁻¹ r / (1 + σ_g² Mᵀ V⁻¹ M)
@@ -20,7 +21,8 @@ from models.diagnosis.explanations.verdict import Explanation, Verdict, Where
 from models.diagnosis.extension import Extension
 from models.diagnosis.pooled_fit.gauss_newton import Fit, FitStatus
 from models.diagnosis.pooled_fit.problem import FitProblem
-from models.diagnosis.pooled_fit.projection import RunScatter, without_likely_gains
+from models.diagnosis.pooled_fit.projection import RunScatter, left_over
+from models.diagnosis.report.friction_law import FrictionLaw
 from models.diagnosis.report.maps import LoopTrace, Maps
 from models.diagnosis.validation.held_out import Gain
 
@@ -36,8 +38,9 @@ class Misfit:
 
 
 def misfit_of(problem: FitProblem, fitted: Fit, where: Sequence[Where] = ()) -> Misfit:
-    """The misfit of a fit: rmse and noise [Nm], the gains taken out."""
-    left = without_likely_gains(problem, fitted) / problem.noise.deviation
+    """The misfit of a fit: rmse and noise [Nm], the gains and the law's discrepancy (where the problem has one) taken
+    out."""
+    left = left_over(problem, fitted) / problem.noise.deviation
     actual = float((left**2).mean())
     unit = float(np.sqrt((problem.noise.deviation**-2.0).mean()))
     return Misfit(
@@ -57,6 +60,8 @@ class Candidate:
     probability: float
     log_evidence_gain: float  # over the baseline [nats]
     estimate: Estimate
+    # ι: the share of its information that is left beside the law's discrepancy [-]; None where it was not refitted
+    isolability: float | None = None
     beside: tuple[str, ...] = ()  # the effects beside it
     fit: FitStatus | None = None  # how that fit ended, None where there is none
 
@@ -113,6 +118,10 @@ class Report:
     unseen: tuple[str, ...] = ()  # effects of which these data show nothing at any size
     maps: Maps | None = None
     loops: tuple[LoopTrace, ...] = ()
+    #: What the friction law does otherwise than eq. 3; None where no plateau shows it.
+    friction_law: FrictionLaw | None = None
+    #: Causes that would explain the data and cannot be told from the form of the friction curve by these tests.
+    like_the_law: tuple[str, ...] = ()
     extension: Extension | None = None
     #: Why a cause that was fitted gives nothing to adopt, in a sentence; empty where it does, or none was fitted.
     not_adoptable: str = ""

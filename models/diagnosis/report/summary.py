@@ -143,13 +143,56 @@ def summarise(report: Report) -> str:
         Verdict.CAUSE_AMBIGUOUS: _ambiguous,
         Verdict.UNEXPLAINED_STRUCTURE: _unexplained,
     }
-    sentences = {sentence.text: sentence for sentence in (*say[report.verdict](report), *_noted(report.notes))}
+    said = (*say[report.verdict](report), *_law(report), *_noted(report.notes))
+    sentences = {sentence.text: sentence for sentence in said}
     kept = list(sentences.values())  # each once
     for matters in (SHOULD, RATHER):
         for place in range(len(kept) - 1, -1, -1):
             if _words(kept) > criteria.MAX_WORDS and kept[place].matters == matters:
                 del kept[place]
     return " ".join(sentence.text for sentence in kept if sentence.text)
+
+
+#: Which test tells a cause from the form of the friction curve.
+_TELLS = {
+    "oil_temperature": "a test with the oil 20 K colder",
+    "interface_heating": "a thermometer in the plate, or dynamic tests",
+    "hydrodynamic_drag": "readings with the clutch open",
+    "torque_zero_shift": "readings of the unloaded torque before each test",
+    "pressure_offset": "a second pressure gauge",
+    "unsettled_dwell": "a test with each plateau held twice as long",
+}
+
+
+def _law(report: Report) -> list[Sentence]:
+    """How the friction curve differs from eq. 3, and which causes look like that."""
+    law, sentences = report.friction_law, list[Sentence]()
+    if law is not None and law.mentioned:
+        low, high = (f"{end:.2g}" for end in law.interval_percent)
+        band = law.where[0]
+        slowest = min(other.low for other in law.where)
+        place = f", mostly below {number(float(f'{_rpm(band.high):.2g}'))} rpm" if band.low == slowest else ""
+        place = place if band.share > 0.5 else ""
+        effect = law.effect_on_remaining_cycles_percent
+        matters = "Remaining life does not depend on it."
+        if effect is None or abs(effect) >= criteria.LAW_MATTERS:
+            matters = f"It changes mean COF by {number(float(f'{law.effect_on_mean_cof_percent:.2g}'))} %."
+        sentences.append(
+            Sentence(
+                f"The friction curve has another form than eq. 3, by {law.rms_percent:.2g} % ({low} to {high} %){place}. "
+                f"{matters}",
+            )
+        )
+    if report.like_the_law:
+        names = listed([_cause_name(slug) for slug in report.like_the_law], "or")
+        tests = list(dict.fromkeys(_TELLS[slug] for slug in report.like_the_law if slug in _TELLS))
+        would = f"; {listed(tests, 'or')} would" if tests else ""
+        sentences.append(Sentence(f"These tests cannot tell {names} from the form of the friction curve{would}."))
+    return sentences
+
+
+def _rpm(speed: float) -> float:
+    return 30.0 * speed / math.pi
 
 
 def _words(sentences: Sequence[Sentence]) -> int:
@@ -161,8 +204,8 @@ def _adequate(report: Report) -> list[Sentence]:
     nothing = next((item.probability for item in report.explanations if not item.effects), 1.0)
     sentences = [
         Sentence(
-            f"The model is adequate (probability {probability(nothing)}): nothing exceeds the noise{noise} and the scatter "
-            f"from run to run{_scatter(report.scatter)}."
+            f"The model is adequate (probability {probability(nothing)}): nothing exceeds the noise{noise}, the scatter "
+            f"from run to run{_scatter(report.scatter)} and the form of the friction curve."
         )
     ]
     other = next((item for item in report.explanations if item.effects), None)

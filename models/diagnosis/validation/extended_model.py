@@ -1,7 +1,8 @@
 """The extended model of a judgement: the effects that it names, fitted together, or a smooth correction; `held_out`
 measures its gain.
 
-Structure without a name is corrected on the axes on which it lives,
+Structure without a name is corrected on the test's clock, the oil's temperature or the loop's phase, where it lives there;
+over speed, pressure and life the law's discrepancy is in every model,
 
     δ(x) = S(v; p, ζ) Σ_k a_k φ_k(x),     a_k ~ N(0, (τ/(1 + k/3))²),     φ_k cosines over the range of each axis
 
@@ -18,7 +19,7 @@ import numpy as np
 
 from models.arrays import FloatArray
 from models.diagnosis import criteria
-from models.diagnosis.design.design import CLOCK, CYCLES, PHASE, PRESSURE, SPEED, TEMPERATURE, Design, Points
+from models.diagnosis.design.design import CLOCK, PHASE, TEMPERATURE, Design, Points
 from models.diagnosis.effects.catalogue import change_columns
 from models.diagnosis.effects.effect import Effect, Kind
 from models.diagnosis.effects.fitted_effect import FittedEffect
@@ -26,7 +27,7 @@ from models.diagnosis.explanations.verdict import Judgement, Verdict
 from models.diagnosis.pooled_fit.gauss_newton import Fit, fit
 from models.diagnosis.pooled_fit.problem import FitProblem
 from models.diagnosis.pooled_fit.projection import gram_of, project
-from models.diagnosis.validation.held_out import Gain, measure_gain
+from models.diagnosis.validation.held_out import FittedModel, Gain, measure_gain
 from models.gaussian_evidence import log_gain
 
 #: The slug of a smooth correction, which is no effect of the catalogue.
@@ -36,9 +37,6 @@ SLUG = "unexplained_structure"
 _STEPS = 6
 
 _OF_POINTS: dict[str, Callable[[Points], FloatArray]] = {
-    SPEED: lambda points: points.velocity,
-    PRESSURE: lambda points: points.pressure,
-    CYCLES: lambda points: np.sqrt(points.cycles),
     CLOCK: lambda points: np.where(points.steady, points.clock, 0.0),
     TEMPERATURE: lambda points: points.temperature,
 }
@@ -106,7 +104,7 @@ def _size(problem: FitProblem, baseline: Fit, effects: Sequence[Effect]) -> floa
     """τ of the largest marginal likelihood, in units of the prior's deviations."""
     unit_changes = [(effect.change(baseline.prediction.scene, 1.0, ()), effect.lags(())) for effect in effects]
     gram = gram_of(problem, baseline, change_columns(problem.design, baseline.prediction, unit_changes))
-    projected = project(gram, problem.noise.run_gain, problem.noise.curve_gain)
+    projected = project(gram, problem.noise.run_gain, problem.noise.curve_gain, problem.noise.law)
     unit = np.array([effect.prior_sd for effect in effects])
     return max(criteria.CORRECTION_SIZES, key=lambda size: log_gain(projected.info, projected.score, size * unit))
 
@@ -119,4 +117,6 @@ def validate(
     extended = judgement.stand[0].fit if judgement.stand else None
     if judgement.verdict is Verdict.UNEXPLAINED_STRUCTURE:
         extended = smooth_fit(problem, baseline, [axis.axis for axis in judgement.where if axis.axis in AXES])
-    return extended, None if extended is None else measure_gain(problem, baseline, extended, rng)
+    if extended is None:
+        return None, None
+    return extended, measure_gain(FittedModel(problem, baseline), FittedModel(problem, extended), rng)

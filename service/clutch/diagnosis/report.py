@@ -16,6 +16,7 @@ from service.channels import PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM, ZERO_C
 
 if TYPE_CHECKING:  # start-up time: they load the whole diagnosis
     from models.diagnosis.experiments.candidates import Step
+    from models.diagnosis.report.friction_law import FrictionLaw, LawCurve
     from models.diagnosis.report.maps import LoopTrace, Maps
     from models.diagnosis.report.report import Misfit, Report
     from models.diagnosis.validation.held_out import Gain
@@ -39,6 +40,8 @@ def empty() -> dict[str, Any]:
         "baseline": _misfit(None),
         "extended": _misfit(None),
         "gain": _gain(None, {}, {}),
+        "friction_law": None,
+        "like_the_law": [],
         "advice": [],
         "visible": [],
         "not_adoptable": None,
@@ -46,6 +49,7 @@ def empty() -> dict[str, Any]:
         "statistics": {},
         "maps": None,
         "loops": [],
+        "law_curves": [],
         "isolability": None,
     }
 
@@ -69,6 +73,8 @@ def public(
         "baseline": _misfit(report.baseline),
         "extended": _misfit(report.extended),
         "gain": _gain(report.gain, before, after),
+        "friction_law": None if report.friction_law is None else _friction_law(report.friction_law),
+        "like_the_law": list(report.like_the_law),
         "advice": [
             _shaped(
                 shapes.AdviceOut,
@@ -86,6 +92,9 @@ def public(
         "statistics": {name: finite(value) for name, value in report.statistics.items()},
         "maps": None if report.maps is None else _maps(report.maps, origin),
         "loops": [_loop(loop, origin) for loop in report.loops],
+        "law_curves": []
+        if report.friction_law is None
+        else [_law_curve(curve, origin) for curve in report.friction_law.curves],
         "isolability": None
         if report.isolability is None
         else {
@@ -178,6 +187,46 @@ def _gain(gain: Gain | None, before: Mapping[str, Any], after: Mapping[str, Any]
     }
 
 
+def _friction_law(law: FrictionLaw) -> dict[str, Any]:
+    gain = law.gain
+    effect = law.effect_on_remaining_cycles_percent
+    return _shaped(
+        shapes.FrictionLawOut,
+        law,
+        where=[
+            {
+                "axis": "speed_rpm",
+                "from_rpm": _rounded(band.low / RADIANS_PER_SECOND_PER_RPM),
+                "to_rpm": _rounded(band.high / RADIANS_PER_SECOND_PER_RPM),
+                "share": _rounded(band.share),
+            }
+            for band in law.where
+        ],
+        effect_on_remaining_cycles_percent=None if effect is None else finite(effect),
+        gain=None
+        if gain is None
+        else _shaped(
+            shapes.LawGainOut,
+            gain,
+            rmse_before_nm=finite(gain.rmse_before),
+            rmse_after_nm=finite(gain.rmse_after),
+            reduction_percent_sd=finite(gain.reduction_sd),
+        ),
+    )
+
+
+def _law_curve(curve: LawCurve, origin: float) -> dict[str, Any]:
+    return {
+        "pressure_bar": curve.pressure / PASCALS_PER_BAR,
+        "cycles": curve.cycles + origin,
+        "speed_rpm": _numbers(curve.speed / RADIANS_PER_SECOND_PER_RPM),
+        "measured_nm": _numbers(curve.measured),
+        "eq3_nm": _numbers(curve.eq3),
+        "law_nm": _numbers(curve.law),
+        "law_sd_nm": _numbers(curve.sd),
+    }
+
+
 def _maps(maps: Maps, origin: float) -> dict[str, Any]:
     return {
         "axes": {
@@ -212,4 +261,8 @@ def _numbers(values: FloatArray) -> list[Any]:
     """An array of any shape as nested lists, rounded, with None where a number is not finite."""
     if values.ndim > 1:
         return [_numbers(row) for row in values]
-    return [float(f"{value:.{_DIGITS}g}") if math.isfinite(value) else None for value in np.asarray(values).tolist()]
+    return [_rounded(value) if math.isfinite(value) else None for value in np.asarray(values).tolist()]
+
+
+def _rounded(value: float) -> float:
+    return float(f"{value:.{_DIGITS}g}")

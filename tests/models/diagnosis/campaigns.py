@@ -25,8 +25,8 @@ from models.diagnosis.pooled_fit.gauss_newton import Fit, fit
 from models.diagnosis.pooled_fit.problem import FitProblem
 from models.diagnosis.report.report import Report
 from models.friction.stribeck import StribeckParameters, torque
-from models.loops.lag_laws import attractor_torque
 from models.records.runs import Plateaus, Record
+from models.relaxation import relax
 from models.rig import campaign as rig
 from models.rig.hidden import clutch_for, hidden_in
 from models.rig.programme import RigProgramme
@@ -57,6 +57,13 @@ class Where:
 
 
 Planted = Callable[[Where], FloatArray]
+#: δ [n] of friction at velocity [n] m/s, pressure [n] Pa and cycles, which loops show with their lag.
+Form = Callable[[FloatArray, FloatArray, float], FloatArray]
+
+
+def exact(velocity: FloatArray, _pressure: FloatArray, _cycles: float) -> FloatArray:
+    """Eq. 3."""
+    return np.zeros_like(velocity)
 
 
 def campaign(
@@ -68,8 +75,11 @@ def campaign(
     temperature: bool = True,
     noise: float = 0.01,
     gain: float = 0.002,
+    form: Form = exact,
+    both_ways: bool = False,
 ) -> Campaign:
-    """A campaign with `planted` added to its torque; noise and gain 0: the bare truth."""
+    """A campaign with `planted` added to its torque, friction of another `form` than eq. 3, every second sweep downwards
+    where speeds go `both_ways`; noise and gain 0: the bare truth."""
     rng = np.random.default_rng(seed)
     clutch = draw(rng)
 
@@ -79,10 +89,11 @@ def campaign(
     stationary, dynamic = [], []
     for number, state in enumerate(cycles):
         head = {"cycles": state, "moment": 1e9 + 86400.0 * number}
-        plateaus = _plateaus(state, clutch, rng, torque_of, noise, gain)
+        speeds = SPEEDS[::-1] if both_ways and number % 2 else SPEEDS
+        plateaus = _plateaus(state, clutch, rng, torque_of, noise, gain, form, speeds)
         stationary.append(StationaryRun(run_id=f"stationary-{number}", **head, plateaus=plateaus))
         if loops:
-            record = _record(state, clutch, rng, torque_of, noise, gain)
+            record = _record(state, clutch, rng, torque_of, noise, gain, form)
             head["moment"] += 2000.0
             dynamic.append(DynamicRun(run_id=f"dynamic-{number}", **head, record=record))
     given = Campaign(stationary=tuple(stationary), dynamic=tuple(dynamic))
@@ -111,15 +122,17 @@ def _plateaus(
     torque_of: Callable[[FloatArray, Where], FloatArray],
     noise: float,
     gain: float,
+    form: Form,
+    speeds: FloatArray,
 ) -> Plateaus:
-    pressure, speed = np.repeat(PRESSURES, SPEEDS.size), np.tile(SPEEDS, PRESSURES.size)
+    pressure, speed = np.repeat(PRESSURES, speeds.size), np.tile(speeds, PRESSURES.size)
     clock = 5.0 * np.arange(speed.size) + 2.5
     swing = rng.uniform(2.0, 4.0) * np.sin(2 * np.pi * clock / rng.uniform(400.0, 900.0) + rng.uniform(0.0, 6.0))
     oil = 358.15 + swing
     parameters = clutch.parameters(pressure, state)
     velocity = clutch.geometry.sliding_velocity(speed)
     at = Where(velocity, pressure, state, oil, clock, np.zeros_like(velocity), parameters, dynamic=False)
-    true = torque_of(torque(velocity, parameters), at)
+    true = torque_of(torque(velocity, parameters) * (1.0 + form(velocity, pressure, state)), at)
     measured = true * (1 + gain * rng.standard_normal()) * (1 + noise * rng.standard_normal(true.size))
     return Plateaus(pressure=pressure, speed=speed, torque=measured, oil_temperature=oil)
 
@@ -131,6 +144,7 @@ def _record(
     torque_of: Callable[[FloatArray, Where], FloatArray],
     noise: float,
     gain: float,
+    form: Form,
 ) -> Record:
     time = np.arange(0.0, 15.0, 0.02)
     speed = 1000 * RPM * (1 - np.cos(2 * np.pi * 0.1 * time))
@@ -143,7 +157,9 @@ def _record(
         full, clock = np.full_like(time, pressure), time + 15 * level
         one = StribeckParameters.from_array(clutch.parameters(float(pressure), state).as_array())
         at = Where(velocity, full, state, oil, clock, acceleration, one, dynamic=True)
-        true = torque_of(attractor_torque(time, np.maximum(velocity, 1e-4), one, 250.0), at)
+        sliding = np.maximum(velocity, 1e-4)
+        curve = torque(sliding, one) * (1.0 + form(sliding, full, state))
+        true = torque_of(relax(time, 250.0 / curve, curve, curve[0]), at)
         measured = true * factor * (1 + noise * rng.standard_normal(time.size))
         parts.append({"time": clock, "pressure": full, "speed": speed, "torque": measured, "oil_temperature": oil})
     return Record(**{name: np.concatenate([part[name] for part in parts]) for name in parts[0]})

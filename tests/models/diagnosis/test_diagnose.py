@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from models.arrays import FloatArray
 from models.diagnosis import diagnose as diagnose_module
 from models.diagnosis.campaign import Campaign, MaintenanceEvent, StationaryRun
 from models.diagnosis.campaign import EventKind as Event
@@ -67,12 +68,12 @@ def test_what_is_planted_is_found(slug: str) -> None:
 
 @pytest.mark.parametrize(("seed", "share", "width"), one_quick([(7, 0.04, 0.7), (5, 0.06, 1.5)]))
 def test_a_bump_in_speed_is_unexplained_and_on_speed(seed: int, share: float, width: float) -> None:
-    """In proportion to friction: no drag, which pressure does not change."""
+    """Of friction, which loops show with its lag; sharper than the law's form is expected to be."""
 
-    def bump(at: Where) -> np.ndarray:
-        return share * torque(at.velocity, at.parameters) * np.exp(-0.5 * ((at.velocity - 6.0) / width) ** 2)
+    def bump(velocity: FloatArray, _pressure: FloatArray, _cycles: float) -> FloatArray:
+        return share * np.exp(-0.5 * ((velocity - 6.0) / width) ** 2)
 
-    report = look(campaign(seed, bump))
+    report = look(campaign(seed, form=bump))
     assert report.verdict is Verdict.UNEXPLAINED_STRUCTURE
     assert report.baseline.where[0].axis == "speed_rpm"
     assert all(each.probability < 0.5 for each in report.candidates)
@@ -164,9 +165,12 @@ def test_nine_of_ten_plain_campaigns_are_adequate() -> None:
     assert verdicts.count(Verdict.MODEL_ADEQUATE) >= 9
 
 
-def test_a_loud_heating_is_named_though_its_screen_leads_to_a_slow_one() -> None:
+def test_a_loud_heating_is_at_work_though_its_screen_leads_to_a_slow_one() -> None:
+    """Without loops what its form leaves may be another cause's beside it."""
     report = look(rehearsal(5, {"interface_heating": 15.0}, dynamic=False, tests=6), 1)
-    assert (report.verdict, report.causes) == (Verdict.CAUSE_NAMED, ("interface_heating",))
+    assert report.verdict in {Verdict.CAUSE_NAMED, Verdict.CAUSE_AMBIGUOUS}
+    assert report.candidates[0].effect == "interface_heating"
+    assert report.candidates[0].probability > 0.99
     assert report.candidates[0].estimate.value == pytest.approx(14.0, abs=2.5)
 
 

@@ -24,7 +24,9 @@ const PRESSURE = "pressure, bar";
  */
 export function charts(name) {
   const loops = new Chart({ id: "diagnosis-loops", title: "Loops under both models", name, wide: true, height: 380 });
+  const law = new Chart({ id: "diagnosis-law", title: "The friction law and eq. 3", name, wide: true, height: 380 });
   return [
+    { chart: law, spec: (report) => lawSpec(report.law_curves ?? []) },
     ...MAPS.map((map) => ({
       chart: new Chart({ id: map.id, title: `Residuals over ${map.id.slice(4)} and pressure`, name, height: 330 }),
       spec: (/** @type {DiagnosisOut} */ report) => mapSpec(report.maps, map),
@@ -117,6 +119,58 @@ function mapLayout(sides, xName) {
 
 /** @type {(z: Table, ys: number[]) => Table} rows and columns exchanged */
 const turned = (z, ys) => ys.map((_, j) => z.map((row) => row[j] ?? null));
+
+/** @type {(curves: LawCurveOut[]) => Spec | null} measured friction curves beside eq. 3 and the law as found */
+function lawSpec(curves) {
+  if (curves.length === 0) return null;
+  const shown = NARROW.matches ? curves.slice(0, 1) : [...new Set([curves[0], curves.at(-1)])].flatMap((c) => c ?? []);
+  return {
+    note: `${shown.map(curveName).join(" · ")}. The band holds the law with a probability of 90 %.`,
+    columns: [
+      { name: "curve" },
+      column("speed, rpm", 1),
+      ...["measured, Nm", "eq. 3, Nm", "law, Nm", "sd, Nm"].map((name) => column(name, 3)),
+    ],
+    rows: curves.flatMap((curve) =>
+      curve.speed_rpm.map((speed, at) => [
+        curveName(curve),
+        speed,
+        ...[curve.measured_nm, curve.eq3_nm, curve.law_nm, curve.law_sd_nm].map((values) => values[at]),
+      ]),
+    ),
+    figure: (c) => ({
+      data: shown.flatMap((curve, place) => lawTraces(curve, place, c)),
+      layout: {
+        grid: { rows: 1, columns: shown.length, pattern: "independent", xgap: 0.12 },
+        ...Object.fromEntries(
+          shown.flatMap((_, place) => [
+            [`xaxis${suffix(place)}`, { ...titled("speed, rpm"), type: "log" }],
+            [`yaxis${suffix(place)}`, titled(place ? "" : "torque, Nm")],
+          ]),
+        ),
+      },
+    }),
+  };
+}
+
+/** @type {(curve: LawCurveOut) => string} */
+const curveName = ({ cycles, pressure_bar: pressure }) => `${fixed(cycles)} cycles, ${fixed(pressure, 1)} bar`;
+
+/** @type {(curve: LawCurveOut, place: number, c: Colours) => PlainTrace[]} */
+function lawTraces(curve, place, c) {
+  const axes = { x: curve.speed_rpm, xaxis: `x${suffix(place)}`, yaxis: `y${suffix(place)}` };
+  const legend = { showlegend: place === 0 };
+  /** @type {(sign: number) => (number | null)[]} */
+  const end = (sign) => curve.law_nm.map((torque, at) => (torque ?? 0) + sign * 1.645 * (curve.law_sd_nm[at] ?? 0));
+  const edge = { ...axes, mode: "lines", line: { width: 0, color: c.accent }, showlegend: false, hoverinfo: "skip" };
+  return [
+    { ...edge, y: end(-1) },
+    { ...edge, y: end(1), fill: "tonexty", fillcolor: `${c.accent}33` },
+    { ...axes, ...legend, name: "measured", y: curve.measured_nm, mode: "markers", marker: { size: 4, color: c.quiet } },
+    { ...axes, ...legend, name: "eq. 3", y: curve.eq3_nm, mode: "lines", line: { width: 2, color: c.worn, dash: "dash" } },
+    { ...axes, ...legend, name: "law as found", y: curve.law_nm, mode: "lines", line: { width: 2, color: c.accent } },
+  ];
+}
 
 const KINDS = /** @type {const} */ (["measured", "baseline", "extended"]);
 /** @typedef {(typeof KINDS)[number]} Kind */

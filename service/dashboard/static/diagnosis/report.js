@@ -166,6 +166,21 @@ const PARTS = {
     return part("Gain on runs that were left out of the fit", error, bars && h("h4", "Remaining cycles"), bars);
   },
 
+  law({ friction_law: law, like_the_law: like = [] }) {
+    if (!law) return null;
+    const [low, high] = law.interval_percent;
+    const band = law.where[0];
+    const lines = [
+      `The friction curve differs from eq. 3 by ${significant(law.rms_percent, 2)} % RMS (90 %: ${significant(low, 2)} to ${significant(high, 2)} %).`,
+      band && `${percent(band.share)} of it lies from ${fixed(band.from_rpm)} to ${fixed(band.to_rpm)} rpm.`,
+      law.gain?.reduction_percent != null &&
+        `On runs left out of the fit the curve as found has ${fixed(law.gain.reduction_percent)} % less error than eq. 3.`,
+      like.length > 0 &&
+        `These tests cannot tell this from the form of the curve: ${like.map((cause) => words(cause).toLowerCase()).join(", ")}.`,
+    ];
+    return part("The friction law", ...lines.filter(Boolean).map((line) => h("p", line)));
+  },
+
   where({ baseline }) {
     const axes = baseline?.where ?? [];
     if (axes.length === 0) return null;

@@ -18,7 +18,7 @@ from models.diagnosis.explanations.evidence import evidence_of
 from models.diagnosis.explanations.verdict import Fitted, Verdict
 from models.diagnosis.pooled_fit.baseline_fit import fit_baseline, missing_for_baseline
 from models.diagnosis.report.maps import loop_traces, residual_maps
-from models.diagnosis.validation.held_out import measure_gain
+from models.diagnosis.validation.held_out import FittedModel, measure_gain
 from models.records.criteria import UNLOADED
 from tests.models.diagnosis.campaigns import CYCLES, SPEEDS, Study, Where, altered, campaign, look, start_of, study
 
@@ -184,10 +184,11 @@ def test_nothing_that_is_said_of_open_rows_is_no_number(given: Study, swung: Stu
     assert np.isfinite(noise.deviation).all()
     extended = given.extended(("inertia_torque", 0.001, ()))
     assert np.isfinite(evidence_of(given.problem, extended).whole)
-    maps = residual_maps(given.problem, fit, extended)
+    maps = residual_maps(given.baseline, given.problem, extended)
     np.testing.assert_array_equal(maps.pressure, swung.design.levels)
-    assert min(each.pressure for each in loop_traces(given.problem, fit, extended)) > 0
-    gain = measure_gain(given.problem, fit, extended, np.random.default_rng(1))
+    assert min(each.pressure for each in loop_traces(given.baseline, given.problem, extended)) > 0
+    both = FittedModel(given.problem, fit), FittedModel(given.problem, extended)
+    gain = measure_gain(*both, np.random.default_rng(1))
     assert all(np.isfinite([gain.rmse_before, gain.rmse_after, gain.log_score_gain, gain.forecast_log_score_gain]))
     assert not {design.runs[run].run_id for run in design.rows.run[~design.closed]} & set(gain.held_out_runs)
 

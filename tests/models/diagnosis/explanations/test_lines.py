@@ -9,12 +9,14 @@ import numpy as np
 import pytest
 
 from models.arrays import FloatArray
+from models.diagnosis import criteria
+from models.diagnosis.baseline.law_form import LawSizes
 from models.diagnosis.campaign import StationaryRun
 from models.diagnosis.design.autocorrelation import Correlation
 from models.diagnosis.design.design import SPEED, TORQUE, Design, Points, build_design
 from models.diagnosis.explanations import contrasts
 from models.diagnosis.explanations.contrasts import contrasts_of
-from models.diagnosis.explanations.evidence import evidence_of, structure_gain
+from models.diagnosis.explanations.evidence import evidence_of, structure_gain, visible_contrasts
 from models.diagnosis.explanations.posterior import posterior_of
 from models.diagnosis.explanations.shapeless import highest_line
 from models.diagnosis.explanations.verdict import LINE, Alternative
@@ -225,12 +227,17 @@ def test_ripples_over_speed_are_seen_through_the_lag_of_loops(plain: Study, wave
     [lambda v: np.exp(-(v**0.6)), lambda v: np.exp(-(v**1.5)), lambda v: 1 - np.tanh(v), lambda v: 1 / (1 + v * v)],
     ids=["stretched", "compressed", "tanh", "rational"],
 )
-def test_a_curve_of_another_form_is_structure_over_speed(plain, form):
-    """That falls within a tenth of the range, with the loops' lag; λ = 50 of it is left beside the baseline."""
-    points, prediction = plain.design.points, plain.baseline.fit.prediction
-    shapes, axes = contrasts_of(plain.design, prediction)
+def test_a_curve_of_another_form_is_the_laws_and_no_structure(plain, form):
+    """That falls within a tenth of the range, with the loops' lag; λ = 50 of it is left beside eq. 3 alone."""
+    points, prediction, problem = plain.design.points, plain.baseline.fit.prediction, plain.problem
     friction = prediction.scene.curve * form(points.velocity / (0.1 * points.velocity.max()))
-    structure = prediction.change_at_rows(plain.design, friction[:, None], before_lag=True)
-    info = information(plain, structure, shapes[:, np.array(axes) == SPEED])
-    score = np.sqrt(2 * 50.0 / info[0, 0]) * info[1:, 0]
-    assert structure_gain(info[1:, 1:], score) > 20.0
+    structure = prediction.change_at_rows(plain.design, friction[:, None], before_lag=True)[:, 0]
+    structure *= np.sqrt(2 * 50.0 / information(plain, structure)[0, 0])
+    fitted = replace(plain.baseline.fit, residual=structure)  # and nothing else is left
+    contrasts_seen, axes = visible_contrasts(problem, fitted)
+    speeds = np.flatnonzero(np.array(axes) == SPEED)
+    reduced = gram_of(problem, fitted, contrasts_seen).reduced(problem.noise.run_gain, 0.0)
+    exact, *others = (reduced.beside_law(LawSizes(size, 0.0, 0.0)) for size in criteria.FORM_SIZES)
+    law = max(others, key=lambda one: one.evidence)
+    assert law.evidence > exact.evidence + 15.0
+    assert structure_gain(law.info[np.ix_(speeds, speeds)], law.score[speeds]) < 1.0

@@ -1,0 +1,164 @@
+"""How a friction law may differ from eq. 3: smooth functions over speed, pressure and life, as a sum of cosines.
+
+    δ(v, p, ζ) = h(x) + q(p) h'(x) + z h''(x) + f(p) + g(z),     x = ln v,  z = √(share of the life)
+
+    h(x) = (v_max/v)^0.2 Σ_k c_k √2 cos(kπ u),   u = (x - x_min)/(x_max - x_min),   c_k ~ N(0, τ_h² w_k),
+    w_k ∝ e^{-½ (kπ ℓ/(x_max - x_min))²},   Σ w_k = 1
+
+the covariance of the coefficients being that of a squared-exponential process of length ℓ. So τ_h is the relative rms of the
+form at the highest speed. Beyond what was measured the value at the end is kept.
+
+Source: M. C. Kennedy and A. O'Hagan, Bayesian calibration of computer models, J. R. Stat. Soc. B 63 (2001) 425-464; lengths
+and the envelope are those of measured friction curves (docs/appendix/diagnosis.md).
+"""
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from models.arrays import FloatArray
+
+#: Waves over speed, the fewer that change with pressure and with life, waves over pressure and over life, at most. Of the
+#: highest the weight is below 1e-4 on ranges up to six in ln v.
+_SPEEDS, _CHANGING, _PRESSURES, _LIVES = 16, 8, 5, 4
+#: Waves over pressure with which the form over speed changes, at most.
+_CHANGING_PRESSURES = 2
+#: Correlation lengths: in ln v (of 15 measured surfaces .36 to .71), and as shares of the range of pressures and of √life.
+_LENGTH, _LAW_LENGTH = 0.4, 0.2
+#: The waves over pressure reach so far beyond the range of pressures, a share of it: within it they may have any slope at
+#: its ends, which an offset of the pressure shows.
+_MARGIN = 0.25
+#: (v_max/v) to this power: what measured curves do otherwise is 1.5 to 4 times as large at the lowest speeds.
+_ENVELOPE = 0.2
+#: How far the form over speed changes with pressure and with life, shares of the form: measured curves' misfits at the
+#: lowest and the highest pressure correlate by .63 to 1; what changes over life is eq. 6's part of each parameter.
+_CHANGES, _CHANGES_OVER_LIFE = 0.5, 0.1
+
+
+#: Nodes of tables along ln v, pressure and √life.
+_NODES = np.linspace(0.0, 1.0, 401)
+
+
+class LawSizes(NamedTuple):
+    """Relative deviations τ [-] of the law: of its form over speed, over pressure and over life."""
+
+    form: float
+    pressure: float
+    life: float
+
+
+#: Eq. 3 and its laws as they are.
+EXACT = LawSizes(0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LawForm:
+    """The functions of which δ is a sum, on the ranges that a campaign measured."""
+
+    slowest: float  # [m/s]
+    fastest: float
+    lowest: float  # [Pa]
+    highest: float
+    first: float  # state [cycles]
+    last: float
+    pressures: int  # distinct ones
+    states: int
+
+    def deviations(self, sizes: LawSizes) -> FloatArray:
+        """The prior deviations [k] of the coefficients [-]."""
+        changing = (_CHANGING + 1) * (min(self._of_pressure, _CHANGING_PRESSURES) + min(self._of_life, 1))
+        return np.repeat(np.array(sizes), (_SPEEDS + 1 + changing, self._of_pressure, self._of_life))
+
+    def shares(self, velocity: FloatArray, pressure: FloatArray, cycles: FloatArray) -> FloatArray:
+        """∂δ/∂coefficient [n, k] at velocity [n] m/s, pressure [n] Pa and cycles [n]."""
+        speed, high, gone = self._units(velocity, pressure, cycles)
+        form = self._form(speed)
+        over_pressure = _waves(high, self._of_pressure, _LAW_LENGTH)[:, 1:]
+        over_life = _waves(gone, self._of_life, _LAW_LENGTH)[:, 1:]
+        changing = form[:, : _CHANGING + 1]
+        blocks = [form, *(changing * factor[:, None] for factor in self._factors(high, gone))]
+        return np.concatenate([*blocks, over_pressure, over_life], axis=1)
+
+    def share(
+        self, coefficients: FloatArray, velocity: FloatArray, pressure: FloatArray, cycles: FloatArray
+    ) -> FloatArray:
+        """δ [n] for coefficients [k]: as `shares` has it, by tables of its functions (error below 0.2 % of the highest
+        wave)."""
+        units, tables = self._units(velocity, pressure, cycles), self._tables(coefficients.tobytes())
+        over_speed, over_pressure, over_life = tables
+        speed, high, gone = units
+        share = np.interp(high, _NODES, over_pressure) + np.interp(gone, _NODES, over_life)
+        factors = [np.ones_like(speed), *self._factors(high, gone)]
+        for factor, part in zip(factors, over_speed, strict=True):
+            share += factor * np.interp(speed, _NODES, part)
+        return np.asarray(share, dtype=np.float64)
+
+    def _units(
+        self, velocity: FloatArray, pressure: FloatArray, cycles: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Places [n] within 0 ... 1 along ln v, pressure and √life."""
+        speed = np.log(np.clip(velocity, self.slowest, self.fastest) / self.slowest) / self._width
+        high = (pressure - self.lowest) / max(self.highest - self.lowest, 1e-300)
+        high = np.clip((high + _MARGIN) / (1.0 + 2.0 * _MARGIN), 0.0, 1.0)
+        gone = np.sqrt(np.clip((cycles - self.first) / max(self.last - self.first, 1.0), 0.0, 1.0))
+        return speed, high, gone
+
+    def _form(self, speed: FloatArray) -> FloatArray:
+        """h's waves [n, 1 + _SPEEDS] with the envelope."""
+        envelope = np.exp(_ENVELOPE * self._width * (1.0 - speed))
+        return _waves(speed, _SPEEDS, _LENGTH / self._width) * envelope[:, None]
+
+    def _factors(self, high: FloatArray, gone: FloatArray) -> list[FloatArray]:
+        """With what the form changes [n] each: waves over pressure, and life."""
+        waves = _waves(high, self._of_pressure, _LAW_LENGTH)[:, 1 : 1 + _CHANGING_PRESSURES]
+        return [_CHANGES * factor for factor in (*waves.T, *((gone,) if self._of_life else ()))]
+
+    @property
+    def _width(self) -> float:
+        """Of the range of ln v."""
+        return max(float(np.log(self.fastest / self.slowest)), 1e-3)
+
+    @lru_cache(maxsize=8)  # noqa: B019 - a few forms, and small tables
+    def _tables(self, coefficients: bytes) -> tuple[list[FloatArray], FloatArray, FloatArray]:
+        """At the nodes: the functions of speed that `_factors` multiply (the first alone), f and g."""
+        known = np.frombuffer(coefficients)
+        form, at = self._form(_NODES), _SPEEDS + 1
+        over_speed = [form @ known[:at]]
+        for _ in range(min(self._of_pressure, _CHANGING_PRESSURES) + min(self._of_life, 1)):
+            over_speed.append(form[:, : _CHANGING + 1] @ known[at : at + _CHANGING + 1])
+            at += _CHANGING + 1
+        over_pressure = _waves(_NODES, self._of_pressure, _LAW_LENGTH)[:, 1:] @ known[at : at + self._of_pressure]
+        over_life = _waves(_NODES, self._of_life, _LAW_LENGTH)[:, 1:] @ known[at + self._of_pressure :]
+        return over_speed, over_pressure, over_life
+
+    @property
+    def _of_pressure(self) -> int:
+        return min(self.pressures - 1, _PRESSURES)
+
+    @property
+    def _of_life(self) -> int:
+        return min(self.states - 1, _LIVES)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LearnedLaw:
+    """δ as a campaign shows it."""
+
+    form: LawForm
+    coefficients: FloatArray  # [k]
+
+    def share(self, velocity: FloatArray, pressure: FloatArray, cycles: FloatArray) -> FloatArray:
+        """δ [n] at velocity [n] m/s, pressure [n] Pa and cycles [n]."""
+        return self.form.share(self.coefficients, velocity, pressure, cycles)
+
+
+def _waves(unit: FloatArray, orders: int, length: float) -> FloatArray:
+    """Cosines [n, 1 + orders] over 0 ... 1, times the deviations that a squared-exponential covariance of a length gives
+    them; all variances sum to one."""
+    order: NDArray[np.int64] = np.arange(orders + 1)
+    weight = np.exp(-0.5 * (np.pi * order * length) ** 2) * np.where(order > 0, 1.0, 0.5)
+    scale = np.sqrt(weight / weight.sum() * np.where(order > 0, 2.0, 1.0))
+    return np.asarray(np.cos(np.pi * unit[:, None] * order) * scale, dtype=np.float64)

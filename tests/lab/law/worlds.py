@@ -1,0 +1,109 @@
+"""Campaigns whose friction law is not eq. 3, with what is hidden in them: measured surfaces of friction, eq. 3 with a share
+of their misfit, and other formulas on the blind rig.
+
+Measured curves lie beside the project (`../shared/data/real_friction_curves`), not in it: where they are missing, so are
+those campaigns.
+"""
+
+import importlib.util
+import json
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+
+from models.arrays import FloatArray
+from models.diagnosis.campaign import Campaign
+from service.api.clutch import ClutchIn
+from service.clutch.diagnosis.campaign import campaign_of, run_of
+from service.runs.json_run import read_run
+from tests.blind.rig import clutch as rig
+from tests.blind.rig.hide import hide
+from tests.blind.rig.sent import campaign
+from tests.measuring import ROOT
+
+CURVES = Path("data/real_friction_curves/real_curves.py")
+#: e^{-1/u} = 1/2 at u = 1.44: each form has fallen by half at the speed at which eq. 3 has.
+_HALF = 1.0 / np.log(2.0)
+
+
+@dataclass(frozen=True)
+class World:
+    """A campaign and what is true of it."""
+
+    campaign: Campaign
+    cause: str | None  # what is hidden, by its name in the catalogue
+    size: float  # [unit of the catalogue], its sign at least
+
+
+def measured() -> Path | None:
+    """Where the measured curves are, if they are."""
+    path = ROOT.parent / "shared" / CURVES
+    return path if path.exists() else None
+
+
+@cache
+def _curves() -> ModuleType:
+    path = measured()
+    if path is None:
+        raise FileNotFoundError(f"the measured curves are not here: {CURVES}")
+    spec = importlib.util.spec_from_file_location("real_curves", path)
+    if spec is None or spec.loader is None:
+        raise FileNotFoundError(path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def of_curves(kind: str, seed: int) -> World:
+    """A campaign of measured curves: `none`, `zero`, `oil`, `offset_late`, or one of these after `mild-` (eq. 3 with a share
+    of a measured curve's misfit) or `control-` (eq. 3)."""
+    clutch, runs, truth = _curves().one(kind, seed)
+    record = ClutchIn.model_validate(clutch)
+    taken = [run_of(read_run(json.dumps(run).encode()), origin=0.0) for run in runs]
+    return World(campaign_of(record, taken), truth["expected"], truth["size"])
+
+
+#: Shares of the fall g(u) of other Stribeck forms, u = v/V_S, each half fallen where eq. 3 is.
+_FALLS: dict[str, Callable[[FloatArray], FloatArray]] = {
+    "tanh": lambda u: np.tanh(u / _HALF * np.arctanh(0.5)),
+    "exponential": lambda u: -np.expm1(-u / _HALF * np.log(2.0)),
+    "rational": lambda u: (u / _HALF) ** 2 / (1.0 + (u / _HALF) ** 2),
+}
+#: Straight pressure laws bow by this share of a bar's change for each bar from 5 bar on.
+_BOW = 0.04
+FORMULAS = (*_FALLS, "bowed")
+
+
+@contextmanager
+def _formula(name: str) -> Iterator[None]:
+    """While it lasts the blind rig's clutches have another law: a form of the fall, or bowed laws over pressure."""
+    torque, law = rig.Law.torque, rig.Clutch.law
+
+    def other(self: rig.Law, v: FloatArray, *, film: FloatArray | None = None, gamma: float = rig.GAMMA) -> FloatArray:
+        w = np.maximum(v if film is None else film, 1e-9)
+        return self.static * (1.0 + (self.ratio - 1.0) * _FALLS[name](w / self.stribeck)) + self.viscous * v**gamma
+
+    def bowed(self: rig.Clutch, bar: FloatArray, cycles: FloatArray) -> rig.Law:
+        return law(self, bar - _BOW * (bar - 5.0) ** 2, cycles)
+
+    try:
+        if name == "bowed":
+            rig.Clutch.law = bowed  # type: ignore[method-assign]
+        else:
+            rig.Law.torque = other  # type: ignore[method-assign]
+        yield
+    finally:
+        rig.Law.torque, rig.Clutch.law = torque, law  # type: ignore[method-assign]
+
+
+def of_formula(name: str, seed: int) -> World:
+    """A campaign of the blind rig with nothing hidden, of another formula than eq. 3; every second one has loops, every
+    second pair a tenth of a percent of noise in place of a third."""
+    with _formula(name):
+        hidden = hide((seed, 2026, FORMULAS.index(name)), (), 0.0, loops=seed % 2 == 0, noise=(1.0, 0.3)[seed // 2 % 2])
+        return World(campaign(hidden), None, 0.0)
