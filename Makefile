@@ -36,8 +36,9 @@
 #              ended                                    (SEED= CAMPAIGNS= HONEST= LIVES= ABLATED= ARGS=--write)
 # make real    what is said of real measurements; make benchmark: how long things take; make picture: README's pictures;
 #              make figures: the figures of docs/
-# make docs    the site of docs/, which the service serves at /help; warnings and dead links are errors
-# make reference  the pages of docs/reference that are made from the code
+# make docs    the site of docs/, which the service serves at /help, with the pages on routes, fields, commands and codes made
+#              from the code; warnings and dead links are errors
+# make reference  all pages that are made from the code, those in git too
 # make gallery    the figures of docs/gallery.md, drawn by the lines that stand beside them
 # make architecture  the picture, the ways and the examples of docs/explanation/architecture.md, from the code
 PYTHON ?= python3
@@ -68,7 +69,9 @@ unexport PYTHONDONTWRITEBYTECODE
 .PHONY: help compiled docs gallery reference adoption demo shell test quick slow faults check check-python check-javascript lowest benchmark load scale real figures architecture blind law oracle visible mutants plausibility score rivals picture lock clean
 .DELETE_ON_ERROR:
 
+# the demo's pages link to /help: where it cannot be built, as without the internet, its page says so
 demo: $(VENV)/.runs
+	@test -f $(HELP)/index.html || $(MAKE) docs || echo "the documentation was not built: /help says how to build it" >&2
 	$(BIN)/clutchlife demo $(ARGS)
 
 shell: $(VENV)/.runs
@@ -139,7 +142,8 @@ real: $(VENV)/.tests
 figures: $(VENV)/.tests
 	$(BIN)/python -m tests.figures
 
-docs: $(VENV)-docs/.ready
+docs: $(VENV)-docs/.ready $(VENV)/.runs
+	$(BIN)/python -m tests.documents made
 	rm -rf $(HELP)
 	$(VENV)-docs/bin/python -m sphinx --quiet --fail-on-warning --keep-going --builder html --fresh-env \
 		--doctree-dir $(VENV)-docs/doctrees docs $(HELP)

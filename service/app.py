@@ -11,7 +11,7 @@ from fastapi import FastAPI
 from fastapi_offline import FastAPIOffline
 
 from service.alarms.outbox import Outbox
-from service.answers.cache import AnswerCache, Revalidation
+from service.answers.store import AnswerStore
 from service.changes import adopt_model, ask_job, raw_records, run_diagnosis
 from service.dashboard import assets, site
 from service.dashboard import pages as dashboard
@@ -92,16 +92,14 @@ def create_app(settings: Settings) -> FastAPI:
                 workers.warm()
                 queue.start()
                 outbox.start()
-                cache = AnswerCache(MAX_CACHED_BYTES)
                 app.state.context = Context(
                     database=database,
-                    cache=cache,
+                    answers=AnswerStore(MAX_CACHED_BYTES, database),
                     metrics=metrics,
                     jobs=queue,
                     outbox=outbox,
                     settings=settings,
                     workers=workers,
-                    revalidation=Revalidation(cache),
                     readiness=readiness,
                     folder=folder,
                     copies=Copies(folder, 2 * settings.max_file_mb * MIB),

@@ -50,7 +50,7 @@ from service.clutch.recomputation import (
     newest_adoption,
     with_set_aside,
 )
-from service.clutch.timeline import ByPressure, Event, order, stationary_tests_of
+from service.clutch.timeline import ByPressure, Event, lives_of, order
 from service.clutch.tracking import CARRIED, States, Tracked
 from service.clutch.with_held import ClutchMeasurements, engagement_rows, needs_evidence, summarised
 from service.errors import BusyError, InvalidError, NotFoundError, unknown_clutch
@@ -151,6 +151,7 @@ def state(
     return ClutchHistory(
         record=own,
         revision=row.revision,
+        archived=row.archived,
         events=past.events,
         adoptions=adoptions,
         priors={severity: _learned_prior(connection, own, severity, tracked) for severity in severities},
@@ -510,7 +511,7 @@ def tracked_again(
 ) -> Results:
     """Results of a clutch whose state has changed while its runs are unchanged."""
     reader = run_reader(database, state.clutch_id)
-    final, computed = computed_again(state, levels, receipts, reader, evaluated=stationary_tests_of(state.events))
+    final, computed = computed_again(state, levels, receipts, reader, evaluated=state.stationary_tests)
     evidence = evidence_for(database, final, reader)
     return replace(computed, summary=summarised(final, computed.tracking or Tracking(), evidence))
 
@@ -518,7 +519,7 @@ def tracked_again(
 def engagements(connection: Connection, clutch_id: str) -> list[MeasuredEngagement]:
     """The accepted engagements of a clutch with all indicators, by life and cycles."""
     stored = _engagements(connection, clutch_id)
-    return engagement_rows(events(connection, clutch_id), stored) if stored else []
+    return engagement_rows(lives_of(events(connection, clutch_id)), stored) if stored else []
 
 
 def _at(row: RunRow) -> Evaluation:

@@ -1,5 +1,5 @@
 """One file an answer; none changes what is stored.
 
-In: the database, a clutch's name and the arguments of a request. Out: dictionaries and lists in the shapes of `api/`.
-Open `remaining_life.py` first; `cache.py` keeps computed answers as bytes.
+In: the database, a clutch's name and the arguments of a request. Out: models of `api/`.
+Open `remaining_life.py` first; `store.py` keeps computed answers as bytes.
 """

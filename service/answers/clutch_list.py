@@ -9,7 +9,7 @@ from sqlalchemy import Connection
 from models.prognosis.criteria import HORIZON
 from service import repository
 from service.alarms import raising
-from service.answers.cache import AnswerCache, to_json
+from service.answers.store import AnswerStore, to_json
 from service.api.alarm import EventOut
 from service.api.base import of_row
 from service.api.clutch import ClutchOut, LatestDiagnosis
@@ -47,7 +47,13 @@ def every(database: Database, *, at_once: int) -> Iterator[ClutchOut]:
 
 
 def page_as_json(
-    database: Database, cache: AnswerCache, choice: ClutchSelection, part: Part, *, offset: int = 0, sort: str = "worst"
+    database: Database,
+    answers: AnswerStore,
+    choice: ClutchSelection,
+    part: Part,
+    *,
+    offset: int = 0,
+    sort: str = "worst",
 ) -> bytes:
     """A page of the clutches of a choice; each one's item is made once for its revision, verdict and alarms. If they are not
     by name, a page's place is how many clutches are before it."""
@@ -68,7 +74,7 @@ def page_as_json(
     def item(clutch: _Shown) -> bytes:
         beside = [to_json(each) for each in (clutch.diagnosis, *clutch.alarms) if each is not None]
         version = (clutch.row.revision, clutch.row.state, *beside)
-        return cache.answer(("clutch", clutch.row.clutch_id), version, lambda: to_json(_item(clutch))).body
+        return answers.answer(("clutch", clutch.row.clutch_id), version, lambda: to_json(_item(clutch))).body
 
     place = by_name("clutch_id") if named else lambda _: (float(before + limit), "")
     return page_as_bytes(list(map(item, clutches_shown)), part.next(rows, place))

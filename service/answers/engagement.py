@@ -26,7 +26,7 @@ from service.clutch.condition import held_runs_left_out
 from service.clutch.engagements import evaluated, public_channels
 from service.clutch.incoming_run import IncomingRun
 from service.clutch.quantities.measured import chosen_life, parameter_medians
-from service.clutch.timeline import Life, lives_of
+from service.clutch.timeline import Life, lives_until
 from service.errors import NotFoundError
 from storage.engine.database import Database
 
@@ -40,14 +40,13 @@ def engaged(database: Database, clutch_id: str, at_cycles: float | None, run_id:
     with database.reading() as connection:
         state, levels = repository.state(connection, clutch_id), repository.levels(connection, clutch_id)
         measured = repository.engagements(connection, clutch_id)
-    happened = [event for event in state.events if at_cycles is None or event.cycles <= at_cycles]
-    lives = lives_of(happened)
+    lives = lives_until(state.lives, at_cycles)
     if not lives:
         raise NotFoundError(
             "no engagement can be simulated: there is no stationary test up to these cycles. Ask for later cycles"
         )
-    assumptions = state.assumptions()
-    cycles = happened[-1].cycles if at_cycles is None else at_cycles
+    assumptions = state.assumptions
+    cycles = lives[-1].events[-1].cycles if at_cycles is None else at_cycles
     row = _compared_row(measured, lives[-1], run_id)
     moments = [cycles] if row is None else [cycles, float(row.cycles)]
     capacities = [capacity_of(parameters) for parameters in _parameters(lives[-1], assumptions, levels, moments)]

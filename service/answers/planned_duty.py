@@ -85,7 +85,7 @@ class _Plan:
 
 def _prediction(state: ClutchHistory, method: str, planned: ProgrammeIn) -> tuple[LifePrediction, _Plan]:
     """The prediction under recent duty, or in its place what the programme makes of it; and what is stated of that."""
-    assumptions, fraction = state.assumptions(), state.fraction
+    assumptions, fraction = state.assumptions, state.fraction
     series = state.lives[-1].pooled(assumptions) if state.events else None
     basis = assumptions.severity.basis.value
     unknown = _Plan(
@@ -95,7 +95,7 @@ def _prediction(state: ClutchHistory, method: str, planned: ProgrammeIn) -> tupl
         counted_by=basis,
     )
     if series is None or not series.measurements:
-        return predict_at(state.events, assumptions, fraction, method=method), unknown
+        return predict_at(state.lives, assumptions, fraction, method=method), unknown
     life, runs = state.lives[-1], len(series.measurements)
     now = life.events[-1].cycles
     tracked = advance(method, series, (state.filters or {}).get(method), runs)

@@ -100,8 +100,8 @@ def _predicted(
 ) -> LifePrediction:
     carried = (state.filters or {}).get(CARRIED[0])
     return predict_at(
-        state.events,
-        state.assumptions(),
+        state.lives,
+        state.assumptions,
         state.fraction,
         method=method,
         pressure_bar=pressure_bar,
@@ -211,8 +211,9 @@ def _by_criteria(
     criterion: str | None,
     pressure_bar: float | None,
 ) -> tuple[LifePrediction, list[CriterionOutcome]]:
-    events = () if chosen.life is None else chosen.life.events
-    prediction = predict_at(events, chosen.assumptions, state.fraction, method=method)
+    prediction = predict_at(
+        [] if chosen.life is None else [chosen.life], chosen.assumptions, state.fraction, method=method
+    )
     measured = measured_life(state, chosen, evidence)
     if measured is None:
         return prediction, []

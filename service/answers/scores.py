@@ -19,7 +19,7 @@ from service.api.life import LifePrediction, MethodName
 from service.channels import whole
 from service.clutch.assumptions import ALL_PRESSURES, Assumptions, severity_name
 from service.clutch.items import INSUFFICIENT
-from service.clutch.timeline import Event, Life
+from service.clutch.timeline import Life
 from service.clutch.tracking import CARRIED, predict_at
 from service.tables import Cells, cells
 from storage import results
@@ -38,7 +38,7 @@ def scores_of_clutch(database: Database, clutch_id: str, method: MethodName) -> 
         state = repository.state(connection, clutch_id)
         rows = results.predictions_of(connection, clutch_id, method, ALL_PRESSURES)
     stored = {row.cycles: repository.prediction(row) for row in rows}
-    assumptions = state.assumptions()
+    assumptions = state.assumptions
     items = []
     for life in state.lives:
         end = end_of_life(life, assumptions, state.fraction)
@@ -70,7 +70,7 @@ def end_of_life(life: Life, assumptions: Assumptions, fraction: float) -> float 
     series = life.pooled(assumptions)
     if not series.measurements:
         return None
-    prediction = predict_at(life.events, assumptions, fraction, method="grid", back_cast=BackCast.nothing())
+    prediction = predict_at([life], assumptions, fraction, method="grid", back_cast=BackCast.nothing())
     threshold = prediction.criterion.threshold_mean_cof
     if prediction.status == INSUFFICIENT or threshold is None:
         return None
@@ -85,8 +85,7 @@ def _predictions(life: Life, assumptions: Assumptions, fraction: float, method: 
     predictions = {}
     for index, event in enumerate(life.events):
         if event.cofs:
-            happened: Sequence[Event] = life.events[: index + 1]
-            predictions[event.cycles] = predict_at(happened, assumptions, fraction, method=method)
+            predictions[event.cycles] = predict_at([life.until(index)], assumptions, fraction, method=method)
     return predictions
 
 

@@ -36,7 +36,7 @@ from service.clutch.assumptions import Assumptions, severity_name
 from service.clutch.condition import held_runs_left_out
 from service.clutch.items import PARAMETER_UNITS
 from service.clutch.quantities.measured import parameter_medians
-from service.clutch.timeline import Event, lives_of
+from service.clutch.timeline import Life
 from service.errors import NotFoundError
 from service.paging import Part, by_cycles, to_cursor
 from service.tables import Cells, cells
@@ -109,8 +109,8 @@ def surface(database: Database, clutch_id: str) -> Surfaces:
     """`/surfaces` of a clutch as it is now. Raises NotFoundError."""
     with database.reading() as connection:
         state, levels = repository.state(connection, clutch_id), repository.levels(connection, clutch_id)
-    assumptions = state.assumptions()
-    grids = surface_grids(state.events, assumptions, levels, state.geometry)
+    assumptions = state.assumptions
+    grids = surface_grids(state.lives, assumptions, levels, state.geometry)
     return Surfaces(
         clutch_id=clutch_id,
         revision=state.revision,
@@ -144,15 +144,14 @@ class SurfaceGrids:
 
 
 def surface_grids(
-    events: Sequence[Event], assumptions: Assumptions, fits: Mapping[str, Sequence[LevelFit]], geometry: Geometry
+    lives: Sequence[Life], assumptions: Assumptions, fits: Mapping[str, Sequence[LevelFit]], geometry: Geometry
 ) -> SurfaceGrids:
     """Parameters over cycles [k] by pressure [p], torque over cycles, pressure and speed [v], of the present life; with too
     few tests for a track at the cycles of these alone. Raises NotFoundError before a test determines all parameters."""
-    history = lives_of(events)
-    speed_range = history[-1].speed_range if history else None
+    speed_range = lives[-1].speed_range if lives else None
     if speed_range is None:
         raise NotFoundError("there are no surfaces, because this life has no stationary test: send one")
-    life = history[-1]
+    life = lives[-1]
     tested = np.unique([event.cycles for event in life.events if event.cofs])
     enough = tested.size >= FEWEST_TESTS  # fewer say nothing of what lies between or behind them
     cycles = np.linspace(life.origin, life.events[-1].cycles, CYCLES) if enough else tested

@@ -53,8 +53,8 @@ _SHARED: tuple[tuple[Any, str], ...] = (
 _OWN: dict[str, Any] = {
     "step": "reads the runs", "replayed": 39, "SeverityWeighed.basis": "dissipated_energy",
     "SeverityWeighed.exponents": [0.0, 0.5, 1.0, 1.5, 2.0, 3.0],
-    "Confirmations.run_ids": ["test-7000", "test-8000"],
-    "Withdrawals.run_ids": ["test-7000", "test-8000"], "Corrections.cycles": {"test-7000": 7000, "test-8000": 8000},
+    "Confirmations.run_ids": ["test-7000", "test-8000"], "Withdrawals.run_ids": ["test-7000", "test-8000"],
+    "Corrections.cycles": {"test-7000": 7000, "test-8000": 8000},
     "SeverityWeighed.probabilities": [0.01, 0.07, 0.83, 0.08, 0.01, 0.0], "clutch_id": "bench3-017",
     "any_of": ["failure", "maintenance"], "EventOut.value": 3900.0, "EventOut.limit": 4000.0,
     "url": "https://example.org/hook", "secret": "wet-clutch-7000", "DeliveryOut.status": 503,
@@ -82,11 +82,7 @@ _OWN: dict[str, Any] = {
     "90 % interval −1.4 to 0.29 bar).",
     "notes": ["2026-11-02-dynamic is left out: its record has no period"], "p_value": 1e-09,
     "prediction_log_score_gain": 4.1, "probability": 0.98, "rmse_after_nm": 0.18, "rmse_before_nm": 0.31,
-    "separates": ["oil_temperature", "hydrodynamic_drag"], "isolability": 0.94, "like_the_law": ["hydrodynamic_drag"],
-    "from_rpm": 20, "to_rpm": 92, "share": 0.61, "rms_percent": 1.2, "interval_percent": [0.9, 1.6],
-    "effect_on_mean_cof_percent": -0.1, "effect_on_remaining_cycles_percent": 0.8, "reduction_percent": 41.0,
-    "reduction_percent_sd": 3.0, "measured_nm": _TORQUES, "eq3_nm": _TORQUES, "law_nm": _TORQUES,
-    "law_sd_nm": [0.02, 0.02, 0.01, 0.01, 0.02], "sign_probability": 0.99,
+    "separates": ["oil_temperature", "viscous_exponent"], "sign_probability": 0.99,
     "statistics": {"share_of_noise": 0.4}, "strength": 30.0, "verdict": "cause_named", "inner_diameter_mm": 99,
     "kinematic_viscosity_100c_cst": 9.3, "kinematic_viscosity_40c_cst": 56, "mean_radius_mm": 58,
     "outer_diameter_mm": 133, "bytes": 812345,
@@ -122,6 +118,10 @@ _OWN: dict[str, Any] = {
     "Change.after": {"cycles": 7000}, "Change.before": {"cycles": 70000}, "ModelName.name": "baseline",
     "Problem.status": 422, "Problem.title": "The content is not valid", "ProblemError.code": "not_finite",
     "ProblemError.value": "nan", "Axes.cycles": [0, 1000, 2000],
+    "CandidateOut.isolability": 0.9, "like_the_law": ["viscous_exponent"], "rms_percent": 3.1,
+    "interval_percent": [2.2, 4.0], "effect_on_mean_cof_percent": -0.4, "effect_on_remaining_cycles_percent": -2.5,
+    "from_rpm": 20, "to_rpm": 120, "LawBandOut.share": 0.7, "eq3_nm": [21.2, 22.6, 22.4, 21.6, 20.7],
+    "law_nm": [21.8, 22.8, 22.4, 21.5, 20.8], "law_sd_nm": [0.1, 0.08, 0.06, 0.06, 0.07],
 }  # fmt: skip
 _EXAMPLES = _OWN | {name: value for value, names in _SHARED for name in names.split()}
 

@@ -37,10 +37,9 @@ from service.clutch.timeline import (
     STATIONARY,
     Event,
     Shown,
-    life_with,
+    lives_of,
     order,
     require_within_ends,
-    stationary_tests_of,
 )
 from service.clutch.with_held import held_summary, summarised
 from service.errors import Notice, NotPossibleNowError
@@ -311,7 +310,7 @@ def _computed(database: Database, loaded: _Loaded, rows: Sequence[RunRow]) -> tu
     accepted = [event for row, event in pairs if row.state == runs.ACCEPTED]
     out = [event for row, event in pairs if row.state != runs.ACCEPTED]
     judged = _judged_with(loaded, accepted)
-    require_within_ends(order([*other_runs.events, *accepted]))
+    require_within_ends(lives_of(order([*other_runs.events, *accepted])))
     held_runs = judged.aside(other_runs.held, [event for row, event in pairs if row.state == runs.HELD])
     after = replace(before, events=judged.settled(other_runs.events, accepted), held=held_runs)
     receipts = {**loaded.receipts}
@@ -319,7 +318,7 @@ def _computed(database: Database, loaded: _Loaded, rows: Sequence[RunRow]) -> tu
     reader = loaded.reader(database)
     computed = Results()
     if accepted or judged.changes or any(row.state == runs.ACCEPTED for row in loaded.rows):
-        evaluated = stationary_tests_of(before.events)
+        evaluated = dict(before.stationary_tests)
         if loaded.again is not None:  # its own loops, and those that are held against its curves
             rejudged = loaded.row.run_id
             evaluated = {loop: test for loop, test in evaluated.items() if rejudged not in (loop, test)}
@@ -335,7 +334,7 @@ def _computed(database: Database, loaded: _Loaded, rows: Sequence[RunRow]) -> tu
     else:
         summary = summarised(after, computed.tracking, evidence)
     teaches = any(
-        life_with(state.events, mended).end is not None
+        state.life_of(mended).end is not None
         for state in (before, after)
         for mended in state.events
         if mended.run_id in own_names

@@ -145,9 +145,8 @@ def _ingested(
             stored = _stored(connection, clutch_id, run)
             if stored is not None:
                 return _repeat(stored, run), False
-            archived = repository.clutch(connection, clutch_id).archived
             before = repository.state(connection, clutch_id, carried=True)
-        if archived:
+        if before.archived:
             raise ArchivedError(f"clutch {clutch_id!r} is archived and takes no more runs")
         outcome = _computed(database, before, arrival, (geometry, torque_filter))
         with database.writing(of=clutch_id) as connection:  # another process's run of the same name moves the revision
@@ -184,8 +183,8 @@ def _computed(
         raise BusyError("the clutch's geometry or filter was edited while the run was read: send the run again")
     event = _event_of(arrival)
     event = replace(event, cofs=cofs_among(before, event, arrival.analysis.fits))
-    state = replace(before, events=timeline.with_event(before.events, event))
-    timeline.require_within_ends(state.events)
+    state = before.with_event(event)
+    timeline.require_within_ends(state.lives)
     levels = _levels(database, state, event, arrival)
     answer, evaluated = _receipt(before, state, event, arrival, levels)
     judged = Judged()
@@ -234,7 +233,7 @@ def _computed(
             levels={run_id: fits for run_id, fits in computed.levels.items() if run_id != event.run_id},
             summary=summarised(final, computed.tracking or Tracking(), evidence),
             judged=judged,
-            teaches=state.kind if not doubts and timeline.life_with(state.events, event).end is not None else None,
+            teaches=state.kind if not doubts and state.life_of(event).end is not None else None,
         ),
         doubts=doubts,
         appended=appended,
@@ -246,10 +245,10 @@ def _receipt(
 ) -> tuple[Evaluation, dict[str, str | None]]:
     """The run's receipt, and by which stationary test the loops of each dynamic one were evaluated: of those before, and of
     the run itself."""
-    evaluated = timeline.stationary_tests_of(before.events)
+    evaluated = dict(before.stationary_tests)
     loops: Sequence[FrictionLoop] = ()
     if event.kind == timeline.DYNAMIC:
-        test = evaluated[event.run_id] = timeline.stationary_tests_of(state.events)[event.run_id]
+        test = evaluated[event.run_id] = state.stationary_tests[event.run_id]
         curves = [] if test is None else levels.get(test, [])
         loops = loops_of(arrival.run.channels, state.geometry, state.record.torque_filter, curves)
     answer = receipt(
@@ -276,14 +275,14 @@ def _one_step(
     corrected: dict[str, timeline.Corrected] = {}
     if state.extension is not None and event is state.events[-1]:
         runs_before = repository.run_reader(database, state.clutch_id)
-        cofs = corrected_newest(state, event, test_of(arrival, timeline.life_with(state.events, event)), runs_before)
+        cofs = corrected_newest(state, event, test_of(arrival, state.life_of(event)), runs_before)
         if cofs is not None:
             event = event.corrected(cofs)
             corrected, state = {event.run_id: cofs}, replace(state, events=(*state.events[:-1], event))
     tracking = track(state, newest=event)
     noticed = history_warnings(state.lives, tracking.warnings, run_id=event.run_id)[event.run_id]
     changed = {event.run_id: answer.model_copy(update={"warnings": answer.warnings + noticed})}
-    outdated = evaluated != timeline.stationary_tests_of(state.events)
+    outdated = evaluated != state.stationary_tests
     if tracking.again or outdated:
         with database.reading() as connection:
             receipts = repository.receipts(connection, state.clutch_id) | changed

@@ -222,7 +222,7 @@ def _kind(name: str) -> Kind:
 
 def lessons_of(state: ClutchHistory) -> tuple[Kind, list[Lesson]]:
     """A clutch's kind, and what each of its lives teaches."""
-    assumptions = state.assumptions()
+    assumptions = state.assumptions
     lessons = [_lesson(life, assumptions, state.fraction) for life in state.lives]
     return state.kind, [lesson for lesson in lessons if lesson is not None]
 
@@ -315,7 +315,7 @@ def _brought_up(database: Database, names: Sequence[str], executor: Executor) ->
         with database.reading() as connection:
             state = repository.state(connection, clutch_id, newest_prior=True)
             last = results.prediction_at(connection, clutch_id, CARRIED[0], ALL_PRESSURES)
-            if last is None or repository.prediction(last).prior == state.assumptions().prior.name:
+            if last is None or repository.prediction(last).prior == state.assumptions.prior.name:
                 return None
             receipts = repository.receipts(connection, clutch_id)
         evidence = None

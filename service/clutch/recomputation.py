@@ -70,6 +70,7 @@ class ClutchHistory:
     events: tuple[timeline.Event, ...]
     adoptions: tuple[Adoption | None, ...]
     priors: Mapping[Severity, LearnedPrior]
+    archived: bool = False
     filters: States | None = None
     held: tuple[timeline.Event, ...] = ()
     summary: Mapping[str, Any] = field(default_factory=dict)
@@ -106,14 +107,25 @@ class ClutchHistory:
     @property
     def kind(self) -> Kind:
         """What clutches have in common with it that teach it and that it teaches."""
-        return kind_of(self.record, self.assumptions().severity)
-
-    def assumptions(self) -> Assumptions:
-        return self._assumptions
+        return kind_of(self.record, self.assumptions.severity)
 
     @cached_property
-    def _assumptions(self) -> Assumptions:
+    def assumptions(self) -> Assumptions:
+        """What the present life is tracked under."""
         return self.assumptions_under(self.extension, self.lives[-1] if self.events else None)
+
+    @cached_property
+    def stationary_tests(self) -> Mapping[str, str | None]:
+        """run_id of every dynamic test -> that of the stationary test that shows the clutch's state at it."""
+        return timeline.stationary_tests_of(self.lives)
+
+    def life_of(self, event: timeline.Event) -> timeline.Life:
+        """The life to which one of its events belongs, whatever became of the event since."""
+        return next(life for life in self.lives if any(member.run_id == event.run_id for member in life.events))
+
+    def with_event(self, event: timeline.Event) -> ClutchHistory:
+        """The clutch as it would be with one more accepted run."""
+        return replace(self, events=timeline.with_event(self.events, event))
 
     def __getstate__(self) -> dict[str, object]:
         """What follows from the state is not sent to another process."""
@@ -208,7 +220,7 @@ def with_cofs(
 def cofs_among(state: ClutchHistory, event: timeline.Event, levels: Sequence[LevelFit]) -> timeline.ByPressure:
     """A run's mean COFs as they are, or would be, in the history: over the protocol of its life's first stationary test,
     which may be itself."""
-    life = timeline.life_with(timeline.with_event(state.events, event), event)
+    life = state.with_event(event).life_of(event)
     return _cofs_of_tests([life], {event.run_id: levels}, state.geometry).get(event.run_id, {})
 
 
@@ -226,8 +238,7 @@ def with_set_aside(
     for event in events:
         name, fits = event.run_id, levels.get(event.run_id, ())
         state_with_event = replace(state, events=timeline.order([*state.events, event]))
-        evaluated = timeline.stationary_tests_of(state_with_event.events)
-        evaluated.pop(name, None)
+        evaluated = {loop: test for loop, test in state_with_event.stationary_tests.items() if loop != name}
         loops = loops_again(state_with_event, levels, reader, evaluated).get(name, [])
         cofs[name], own_levels[name] = cofs_among(state, event, fits), fits
         warnings = [warning for warning in receipts[name].warnings if warning.code not in OF_HISTORY]
@@ -265,7 +276,7 @@ def track(state: ClutchHistory, *, newest: timeline.Event | None = None) -> Trac
     """Track what the history asks for: one step where `newest` comes last and the filters' states serve, else all of it."""
     if not state.events:
         return Tracking()
-    assumptions, lives = state.assumptions(), state.lives
+    assumptions, lives = state.assumptions, state.lives
     last = lives[-1].pooled(assumptions)
     carried = None if newest is None else _carried(state, lives[-1], last, newest)
     first = 0 if carried is None else len(lives[-1].events) - 1
@@ -315,7 +326,7 @@ def loops_again(
     """run_id -> loops of the dynamic tests that have another stationary test than that which they were `evaluated` against,
     by run_id; of those that are not there, too."""
     loops = {}
-    for run_id, test in timeline.stationary_tests_of(state.events).items():
+    for run_id, test in state.stationary_tests.items():
         if run_id not in evaluated or evaluated[run_id] != test:
             fits = [] if test is None else levels.get(test, [])
             loops[run_id] = loop_items(

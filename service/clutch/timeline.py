@@ -400,9 +400,17 @@ def maintenance_fields(event: str | None, reason: str | None) -> MaintenanceFiel
     }
 
 
-def require_within_ends(events: Sequence[Event]) -> None:
-    """Raise LifeEndedError where a life of an ordered history has duty or tests after its declared end, or two ends."""
-    beyond = beyond_end(events)
+def lives_until(lives: Sequence[Life], cycles: float | None) -> Sequence[Life]:
+    """Lives as they were at so many cycles since new, None: as they are."""
+    if cycles is None:
+        return lives
+    happened = ((life, tuple(event for event in life.events if event.cycles <= cycles)) for life in lives)
+    return [Life(origin=life.origin, events=events) for life, events in happened if events]
+
+
+def require_within_ends(lives: Sequence[Life]) -> None:
+    """Raise LifeEndedError where one of the lives of a clutch has duty or tests after its declared end, or two ends."""
+    beyond = beyond_end(lives)
     if beyond is not None:
         end, event = beyond
         later = "a second end" if event.end else f"{event.kind} {event.run_id!r}"
@@ -412,9 +420,9 @@ def require_within_ends(events: Sequence[Event]) -> None:
         )
 
 
-def beyond_end(events: Sequence[Event]) -> tuple[Event, Event] | None:
-    """A declared end of an ordered history, and duty or a test after it in its life, or a second end; None without any."""
-    for life in lives_of(events):
+def beyond_end(lives: Sequence[Life]) -> tuple[Event, Event] | None:
+    """A declared end of one of the lives, and duty or a test after it in that life, or a second end; None without any."""
+    for life in lives:
         end = life.end
         if end is None:
             continue
@@ -425,16 +433,11 @@ def beyond_end(events: Sequence[Event]) -> tuple[Event, Event] | None:
     return None
 
 
-def life_with(events: Sequence[Event], event: Event) -> Life:
-    """The life of an ordered history to which one of its events belongs, whatever became of it since."""
-    return next(life for life in lives_of(events) if any(member.run_id == event.run_id for member in life.events))
-
-
-def stationary_tests_of(events: Sequence[Event]) -> dict[str, str | None]:
+def stationary_tests_of(lives: Sequence[Life]) -> dict[str, str | None]:
     """run_id of every dynamic test -> that of the stationary test that shows the clutch's state at it: the last one of its
     life up to its cycles, else the next; None where there is none."""
     names: dict[str, str | None] = {}
-    for life in lives_of(events):
+    for life in lives:
         tests = [event for event in life.events if event.speed_range is not None]
         cycles = [test.cycles for test in tests]
         for event in life.events:

@@ -33,7 +33,7 @@ from service.channels import PASCALS_PER_BAR, bar, whole
 from service.clutch import items, notices
 from service.clutch.assumptions import ALL_PRESSURES, WEAK, Assumptions
 from service.clutch.criteria import FEWEST_PARTICLES, PREDICTION_DRAWS
-from service.clutch.timeline import Event, Life, Series, lives_of, nearest_pressure
+from service.clutch.timeline import Life, Series, lives_until, nearest_pressure
 from service.errors import NotFoundError
 
 FilterState = ParticleState | UkfState | GridState
@@ -351,7 +351,7 @@ def mean_offset_of(series: Series) -> Offset | None:
 
 
 def predict_at(
-    events: Sequence[Event],
+    lives: Sequence[Life],
     assumptions: Assumptions,
     fraction: float,
     *,
@@ -361,18 +361,18 @@ def predict_at(
     back_cast: BackCast | None = None,
     carried: Tracked | None = None,
 ) -> LifePrediction:
-    """The prediction at one pressure of the reference test, or over all, as it would have been made at `at_cycles`.
+    """The prediction for the last of the lives at one pressure of its reference test, or over all, as it would have been
+    made at `at_cycles`.
 
     A `back_cast` that is known is not made again: of the exact filter it takes most of the time. A filter that was `carried`
     through the first measurements goes on. Raises NotFoundError where the reference test did not measure that pressure.
     """
-    lives = lives_of(events)
     level = ALL_PRESSURES if pressure_bar is None else _level(lives[-1] if lives else None, pressure_bar)
-    happened = [event for event in events if at_cycles is None or event.cycles <= at_cycles]
+    happened = lives_until(lives, at_cycles)
     if not happened:
         return items.insufficient(assumptions, None, level, fraction)
-    life = lives_of(happened)[-1]
-    cycles = happened[-1].cycles
+    life = happened[-1]
+    cycles = life.events[-1].cycles
     series = life.pooled(assumptions) if pressure_bar is None else life.at(assumptions, level)
     if not series.measurements:
         return items.ended(items.insufficient(assumptions, cycles, level, fraction), life.end)

@@ -17,7 +17,7 @@ from service.clutch.model_correction import RunReader
 from service.clutch.quantities.ends import CriterionEnd, criteria_answer, criterion_end
 from service.clutch.quantities.measured import ChosenLife, MeasuredLife, chosen_life
 from service.clutch.recomputation import ClutchHistory, Levels, Tracking, with_cofs
-from service.clutch.timeline import Event, lives_of, moment_at, order, pace_of
+from service.clutch.timeline import Life, moment_at, order, pace_of
 from service.clutch.tracking import CARRIED, States, predict_at
 from service.errors import NotFoundError
 
@@ -46,7 +46,7 @@ def summarised(state: ClutchHistory, tracking: Tracking, evidence: ClutchMeasure
     if evidence is not None:
         prediction = by_own_criteria(state, SHOWN, prediction, evidence, tracking.filters)
     payload = prediction.model_dump(mode="json", exclude_unset=True)
-    pace, pooled = pace_of(life.events), life.pooled(state.assumptions())
+    pace, pooled = pace_of(life.events), life.pooled(state.assumptions)
     summary = {name: payload[name] for name in STORED} | {
         "runs": len(state.events),
         "new_levels": [event.run_id for event in state.events if event.new_level],
@@ -82,9 +82,7 @@ def with_held(state: ClutchHistory, evidence: ClutchMeasurements) -> ClutchHisto
 
 def outlook(state: ClutchHistory, method: str, evidence: ClutchMeasurements, filters: States) -> Mapping[str, Any]:
     """The remaining life by a filter and the clutch's own criteria; `filters` of other measurements are not carried on."""
-    prediction = predict_at(
-        state.events, state.assumptions(), state.fraction, method=method, carried=filters.get(method)
-    )
+    prediction = predict_at(state.lives, state.assumptions, state.fraction, method=method, carried=filters.get(method))
     prediction = by_own_criteria(state, method, prediction, evidence, filters)
     return {name: getattr(prediction, name) for name in ("status", "as_of_cycles", "remaining_cycles", "at_least")}
 
@@ -119,13 +117,13 @@ def measured_life(
         fraction=state.fraction,
         levels=evidence.levels,
         receipts=evidence.receipts,
-        engagements=engagement_rows(state.events, evidence.engagements),
+        engagements=engagement_rows(state.lives, evidence.engagements),
         filters=filters or {},
     )
 
 
-def engagement_rows(events: Sequence[Event], engagements: Mapping[str, StoredEngagement]) -> list[MeasuredEngagement]:
+def engagement_rows(lives: Sequence[Life], engagements: Mapping[str, StoredEngagement]) -> list[MeasuredEngagement]:
     """The engagements of a history with all indicators, by life and cycles."""
-    names = [[event.run_id for event in life.events] for life in lives_of(events)]
-    stored = [engagements[event.run_id] for event in events if event.run_id in engagements]
+    names = [[event.run_id for event in life.events] for life in lives]
+    stored = [engagements[run_id] for of_life in names for run_id in of_life if run_id in engagements]
     return engagements_over_life(stored, names) if stored else []

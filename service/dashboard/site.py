@@ -1,4 +1,4 @@
-"""`/help`: the site of `docs/`, as `make docs` built it; where it was not built, a line that says how.
+"""`/help`: the site of `docs/`, as `make docs` built it; where it was not built, a page that says how.
 
 The wheel and the container's image have it built in. Its pages hold no data and no script, and load nothing from elsewhere.
 """
@@ -7,14 +7,30 @@ import posixpath
 from pathlib import Path
 
 from fastapi import APIRouter, Request
-from fastapi.responses import RedirectResponse, Response
+from fastapi.responses import HTMLResponse, RedirectResponse, Response
 from starlette.exceptions import HTTPException
 
 from service.dashboard.assets import TYPES, Asset, read
 from service.dashboard.pages import REVALIDATE, answer
 
 SITE = Path(__file__).parent / "help"
-NOT_BUILT = "The help is not built here: run `make docs` in the checkout and start the service again.\n"
+NOT_BUILT = """<!doctype html>
+<html lang="en">
+  <head>
+    <meta charset="utf-8" />
+    <meta name="viewport" content="width=device-width, initial-scale=1" />
+    <title>Clutchlife: help</title>
+  </head>
+  <body>
+    <main>
+      <h1>The help is not built here</h1>
+      <p>Run <code>make docs</code> in the checkout, and start the service again. Packages and images of a release have the
+      help built in.</p>
+      <p><a href="..">Back to the clutches</a></p>
+    </main>
+  </body>
+</html>
+"""
 
 
 def router(folder: Path = SITE) -> APIRouter:
@@ -32,7 +48,7 @@ def router(folder: Path = SITE) -> APIRouter:
     def page(request: Request, name: str) -> Response:
         """A page, a picture or what a page loads."""
         if not paths:
-            return Response(NOT_BUILT, status_code=404, media_type="text/plain; charset=utf-8")
+            return HTMLResponse(NOT_BUILT, status_code=404)
         if name.endswith("/") or not name:
             name = posixpath.join(name, "index.html")
         if name not in paths:

@@ -129,7 +129,7 @@ def before_and_after(
 
     def prediction(life: Life, model: Extension | None) -> Mapping[str, Any]:
         assumptions = state.assumptions_under(model, life)
-        return repository.json_of(predict_at(life.events, assumptions, state.fraction, method=_METHOD))
+        return repository.json_of(predict_at([life], assumptions, state.fraction, method=_METHOD))
 
     before = prediction(plain, None)
     if extension is None:

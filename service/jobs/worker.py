@@ -23,7 +23,7 @@ LOADED_EARLY = (
     "filterpy.kalman",
     "scipy.ndimage",
     "service.changes.ingest_run",
-    "service.answers.cache",
+    "service.answers.store",
     "service.runs.json_run",
     "service.runs.upload",
 )

@@ -13,7 +13,7 @@ from fastapi.concurrency import run_in_threadpool
 
 from models.prognosis.criteria import HORIZON
 from service.alarms.outbox import Outbox
-from service.answers.cache import AnswerCache, Revalidation
+from service.answers.store import AnswerStore
 from service.api.parameters import SHORT
 from service.jobs.queue import JobQueue
 from service.jobs.workers import Workers
@@ -61,13 +61,12 @@ class Context:
     """The service's parts, made when it starts and closed when it stops."""
 
     database: Database
-    cache: AnswerCache
+    answers: AnswerStore
     metrics: Metrics
     jobs: JobQueue
     outbox: Outbox
     workers: Workers
     settings: Settings
-    revalidation: Revalidation
     readiness: Readiness
     #: Where files are kept while they come in and go out.
     folder: Path

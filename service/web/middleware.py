@@ -7,7 +7,7 @@ import time
 import zlib
 from abc import ABC, abstractmethod
 from collections import OrderedDict
-from collections.abc import Callable, Hashable
+from collections.abc import Hashable
 from dataclasses import dataclass
 from logging import DEBUG, INFO, WARNING
 from typing import Any
@@ -22,6 +22,7 @@ from starlette.requests import ClientDisconnect, Request
 from starlette.responses import RedirectResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from service.answers.store import Again
 from service.errors import BusyError, InvalidError, ServiceError, TooLargeError, TooManyError, UnsupportedMediaTypeError
 from service.logging import access, log_request, request_id, sane
 from service.web import limits
@@ -196,7 +197,6 @@ class Edge(_OfRequests):
 
 
 _REMEMBERED = "clutchlife.poll"
-Again = Callable[[Request], Response | None]  # the held answer, None where there is none for the present revision
 
 
 def remember(request: Request, again: Again) -> None:
@@ -213,7 +213,6 @@ class Polls(_OfRequests):
     def __init__(self, app: ASGIApp) -> None:
         super().__init__(app)
         self._places: OrderedDict[str, tuple[Any, str | None]] = OrderedDict()  # the route and the clutch of a path
-        self._polls: OrderedDict[tuple[str, Hashable], Again] = OrderedDict()
 
     async def handle(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["method"] != "GET":
@@ -222,18 +221,19 @@ class Polls(_OfRequests):
         path, query = scope["path"], scope["query_string"]
         if path in self._places:
             route, clutch_id = self._places[path]
-            again = self._polls.get((path, _arguments(route, query)))
+            again = context_of(Request(scope)).answers.again((path, _arguments(route, query)))
             if again is not None and (response := await _answered(route, clutch_id, again, scope)) is not None:
                 await response(scope, receive, send)
                 return
         await self.app(scope, receive, send)
         again = scope.get(_REMEMBERED)
         if again is not None:
-            self._places[path] = scope["route"], clutch_of(Request(scope))
-            self._polls[path, _arguments(scope["route"], query)] = again
-            for index in (self._places, self._polls):
-                while len(index) > limits.MAX_POLLED:
-                    index.popitem(last=False)
+            request = Request(scope)
+            self._places[path] = scope["route"], clutch_of(request)
+            while len(self._places) > limits.MAX_POLLED:
+                self._places.popitem(last=False)
+            asked = (path, _arguments(scope["route"], query))
+            context_of(request).answers.remember(asked, again, limits.MAX_POLLED)
 
 
 async def _answered(route: Any, clutch_id: str | None, again: Again, scope: Scope) -> Response | None:

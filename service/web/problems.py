@@ -11,7 +11,7 @@ from fastapi.exceptions import RequestValidationError
 from fastapi.responses import Response
 from starlette.exceptions import HTTPException
 
-from service.answers.cache import to_json
+from service.answers.store import to_json
 from service.api.base import Problem, ProblemError, rule_in_words
 from service.errors import (
     ConflictError,

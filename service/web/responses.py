@@ -23,7 +23,7 @@ from fastapi.responses import Response
 from pydantic import BaseModel
 from starlette.requests import ClientDisconnect
 
-from service.answers.cache import CachedAnswer, CsvPage, Made, name_of, revision_and_json, shared_answer, to_json
+from service.answers.store import Again, CachedAnswer, CsvPage, Made, name_of, revision_and_json, to_json
 from service.api.parameters import ClutchId
 from service.errors import UnsupportedMediaTypeError, unknown_clutch
 from service.jobs.workers import CHANGE_SECONDS, Lane
@@ -33,7 +33,7 @@ from service.web.auth import Admin, Reader, grant_of, snapshot_of
 from service.web.bodies import parsed
 from service.web.context import Context, Cursor, Limit, Whole
 from service.web.limits import LONGEST_WAIT_SECONDS, USUAL_ITEMS, WAIT_SECONDS
-from service.web.middleware import Again, remember
+from service.web.middleware import remember
 from service.web.problems import CHANGING, Described
 from storage import clutches
 from storage.encoding import to_text
@@ -106,10 +106,10 @@ async def cached_answer(
     context: Context, key: Hashable, version: Hashable, make: Callable[[], bytes | CsvPage]
 ) -> CachedAnswer:
     """What the cache has for `key` at `version`; where it has nothing yet, `make` is called in a thread."""
-    answer = context.cache.held(key, version)
+    answer = context.answers.held(key, version)
     if answer is not None:
         return answer
-    return await run_in_threadpool(context.cache.answer, key, version, make)
+    return await run_in_threadpool(context.answers.answer, key, version, make)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -279,17 +279,15 @@ async def _computed(
         return context.workers.submit(lane_used, revision_and_json, query, clutch_id, arguments, turn=turn)
 
     key = (clutch_id, name_of(query), *arguments)
-    if not arguments and not context.revalidation.knows(key):
-        shared = await run_in_threadpool(shared_answer, context.database, query, clutch_id)
-        if shared is not None:
-            context.revalidation.begin(key, *shared)
-    return await context.revalidation.answer(key, revision, compute, wait=wait)
+    if not arguments and not context.answers.knows(key):
+        await run_in_threadpool(context.answers.begin_shared, key, query, clutch_id)
+    return await context.answers.renewed(key, revision, compute, wait=wait)
 
 
 async def begin_computed(context: Context, clutch_id: str, query: Query[BaseModel]) -> None:
     """Hold the answer of a clutch that has just been registered, so that the one after its first run is not waited for."""
     revision, body = await run_in_threadpool(revision_and_json, context.database, query, clutch_id, ())
-    context.revalidation.begin((clutch_id, name_of(query)), revision, body)
+    context.answers.begin((clutch_id, name_of(query)), revision, body)
 
 
 def repeated_answer(context: Context, key: Hashable, *, of_clutch: bool = True) -> Again:
@@ -297,7 +295,7 @@ def repeated_answer(context: Context, key: Hashable, *, of_clutch: bool = True) 
 
     def again(request: Request) -> Response | None:
         snapshot = snapshot_of(request)
-        cached = context.cache.held(key, snapshot.revision if of_clutch else snapshot.version)
+        cached = context.answers.held(key, snapshot.revision if of_clutch else snapshot.version)
         return None if cached is None else tagged(request, cached, JSON_TYPE, snapshot.revision if of_clutch else None)
 
     return again

@@ -7,4 +7,4 @@ from tests.measuring import fill
 if __name__ == "__main__":
     picture.main()
     fill(document.DOCUMENT, document.written() | document.measured())
-    reference.write()
+    reference.write(reference.kept())

@@ -1,7 +1,8 @@
 """The pages of docs/reference that are made from the code: settings, commands, routes, fields, codes, metrics.
 
-Each is a function from the code to Markdown. Tables of docs/appendix that other pages quote are copied to them again.
-`python -m tests.documents` writes all, `test_reference.py` holds them.
+Each is a function from the code to Markdown. Routes, fields, commands and codes are made for the site alone (`made`) and
+stand in no repository. Tables of docs/appendix that other pages quote are copied to them again. `python -m tests.documents`
+writes all, `test_reference.py` holds them. Nothing here needs more than what the service runs with.
 """
 
 import ast
@@ -17,15 +18,16 @@ import typer
 from prometheus_client.parser import text_string_to_metric_families
 
 from service import errors
+from service.app import create_app
 from service.cli import main as command_line
 from service.settings import PREFIX, Settings
 from service.web.metrics import Metrics
 from storage.engine.opening import open_database
 from tests import measuring
 from tests.measuring import ROOT
-from tests.service.clients import described
 
 FOLDER = ROOT / "docs" / "reference"
+OUT_OF_GIT = ("codes.md", "commands.md", "fields.md", "routes.md")
 #: Statuses that every address with a key may answer with.
 ANYWHERE = (401, 403, 422, 429, 503)
 #: Arguments that need no help in the terminal.
@@ -37,13 +39,32 @@ WRITTEN = "This page is made from the code by `make reference`."
 Json = Mapping[str, Any]
 
 
-def pages() -> dict[Path, str]:
-    description = described()
-    made = (settings(), commands(), routes(description), fields(description), codes(), metrics())
-    names = ("settings", "commands", "routes", "fields", "codes", "metrics")
-    own = {FOLDER / f"{name}.md": text for name, text in zip(names, made, strict=True)}
-    others = [path for path in [ROOT / "README.md", *(ROOT / "docs").rglob("*.md")] if path not in own]
+def made() -> dict[Path, str]:
+    """The pages that are out of git."""
+    description = create_app(Settings()).openapi()
+    by_name = {
+        "commands": commands(),
+        "routes": routes(description),
+        "fields": fields(description),
+        "codes": codes(),
+    }
+    return {FOLDER / f"{name}.md": text for name, text in by_name.items()}
+
+
+def kept() -> dict[Path, str]:
+    """The pages that are in git: short ones, and those that quote a table of another."""
+    own = {FOLDER / "settings.md": settings(), FOLDER / "metrics.md": metrics()}
+    others = [
+        path
+        for path in [ROOT / "README.md", *(ROOT / "docs").rglob("*.md")]
+        if path not in own and path.name not in OUT_OF_GIT
+    ]
     return own | {path: quoting(path) for path in others if "<!-- quote " in path.read_text(encoding="utf-8")}
+
+
+def pages() -> dict[Path, str]:
+    """All of them."""
+    return made() | kept()
 
 
 _QUOTE = re.compile(r"(<!-- quote (\S+): (.*?) -->\n)(.*?)(<!-- end -->)", flags=re.DOTALL)
@@ -70,8 +91,8 @@ def quoted(lines: Sequence[str], keys: Sequence[str]) -> str:
     raise ValueError(f"no table has all of {keys}")
 
 
-def write() -> None:
-    for path, text in pages().items():
+def write(pages: Mapping[Path, str]) -> None:
+    for path, text in pages.items():
         path.write_text(text, encoding="utf-8")
         print(f"{path.relative_to(ROOT)}: {len(text.splitlines())} lines")
 

@@ -14,7 +14,7 @@ from service.clutch.analysis import Analysis, analyse, mean_cofs
 from service.clutch.incoming_run import IncomingRun
 from service.clutch.plausibility import doubts
 from service.clutch.recomputation import Arrival
-from service.clutch.timeline import Event, Life, life_with, lives_of, order, reference_velocities
+from service.clutch.timeline import Event, Life, lives_of, order, reference_velocities
 from service.errors import InvalidError
 from service.runs.json_run import read_run
 from tests.plausibility.ablation import WITHOUT, without
@@ -108,7 +108,8 @@ class Bench:
         shown, odd = doubts.doubts_alone(run, analysis, self.geometry)
         arrival = Arrival(run=run, sampled=False, analysis=analysis, shown=shown, odd=odd, received_at=RECEIVED)
         event = ingest_run._event_of(arrival)
-        life = life_with(order([*self.events, event]), event)
+        lives = lives_of(order([*self.events, event]))
+        life = next(life for life in lives if any(member.run_id == event.run_id for member in life.events))
         return run, analysis, replace(event, cofs=self._cofs(life, event))
 
     def _settle(self, events: tuple[Event, ...]) -> None:

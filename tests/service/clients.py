@@ -13,7 +13,7 @@ from fastapi.testclient import TestClient
 from pydantic import BaseModel
 from typer.testing import CliRunner
 
-from service.answers.cache import to_json
+from service.answers.store import to_json
 from service.app import create_app
 from service.cli.main import app as command_line
 from service.settings import Settings

@@ -31,7 +31,7 @@ from service.channels import PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM, ZERO_C
 from service.clutch.analysis import Analysis
 from service.clutch.incoming_run import IncomingRun
 from service.clutch.plausibility.reading import DEAD, DEAD_PRESSURE, columns_of, dead_channels, runs_of, shown_by
-from service.clutch.timeline import Event, Shown, beyond_end, order, with_event
+from service.clutch.timeline import Event, Shown, beyond_end, lives_of, order, with_event
 from service.errors import Notice
 
 OFF_PACE, AGAINST_TIME = "cycles_off_pace", "cycles_against_time"
@@ -277,7 +277,11 @@ def levelled(
 
 def _doubted(accepted: Sequence[Event], held: Sequence[Event], new: Sequence[Event] = ()) -> list[Event]:
     """The held runs that are part of the question: without a dead channel, and not after the declared end of their life."""
-    return [event for event in held if event.shown is not None and beyond_end(order([*accepted, *new, event])) is None]
+    return [
+        event
+        for event in held
+        if event.shown is not None and beyond_end(lives_of(order([*accepted, *new, event]))) is None
+    ]
 
 
 def _levels(events: Sequence[Event], judgement: JointJudgement) -> dict[str, bool]:

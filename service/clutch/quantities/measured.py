@@ -28,7 +28,7 @@ from service.clutch.criteria import FEWEST_SPEEDS, TRAJECTORY_DRAWS, TRAJECTORY_
 from service.clutch.engagements import ALL_INDICATORS
 from service.clutch.items import PARAMETER_UNITS
 from service.clutch.recomputation import ClutchHistory
-from service.clutch.timeline import DYNAMIC, Event, Life, Series, lives_of, nearest, nearest_pressure, order
+from service.clutch.timeline import DYNAMIC, Event, Life, Series, lives_until, nearest, nearest_pressure, order
 from service.clutch.tracking import States, advance, drawn, step_rng
 from service.errors import InvalidError, NotFoundError
 
@@ -128,11 +128,11 @@ def chosen_life(state: ClutchHistory, number: int | None = None, at_cycles: floa
     lives = state.lives
     if number is not None and not 1 <= number <= len(lives):
         raise NotFoundError(f"the clutch has {len(lives)} lives, there is no life {number}")
-    until = lives if at_cycles is None else lives_of([event for event in state.events if event.cycles <= at_cycles])
+    until = lives_until(lives, at_cycles)
     index = len(until) if number is None else number
     held_runs = _held_runs_of_life(state, index, at_cycles)
     if not 1 <= index <= len(until):
-        life, assumptions = None, state.assumptions()
+        life, assumptions = None, state.assumptions
     else:
         life, whole_life = until[index - 1], lives[index - 1]
         adopted = next((a for a in state.adoptions if a is not None and a.life == whole_life.name), None)

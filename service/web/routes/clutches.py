@@ -9,8 +9,8 @@ from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import Response
 
 from service.answers import clutch_list, fleet_priors, runs, scores
-from service.answers.cache import to_json
 from service.answers.degradation import degradation
+from service.answers.store import to_json
 from service.api.clutch import ClutchEdit, ClutchIn, ClutchOut, ClutchPage
 from service.api.fleet import FleetPriorPage, FleetScores, FleetTotals, Scores
 from service.api.life import Method
@@ -76,7 +76,7 @@ async def list_clutches(
     of them, sort by name: then none is missed or repeated.
     """
     choice = ClutchSelection(archived=archived, only=auth.grant_of(request).clutches, state=state, held=held, find=find)
-    make = partial(clutch_list.page_as_json, context.database, context.cache, choice, part, offset=offset, sort=sort)
+    make = partial(clutch_list.page_as_json, context.database, context.answers, choice, part, offset=offset, sort=sort)
     return await _answer_about_all_clutches(request, context, ("clutches", choice, part, offset, sort), make)
 
 

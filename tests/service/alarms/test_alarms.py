@@ -166,7 +166,9 @@ def test_a_bound_calls_only_where_the_tests_show_the_end_and_again_on_the_way_to
     messages = [called[cycles][0] for cycles in raised_at]
     assert all("(95 %), 50 % chance of " in message or "no further cycle" in message for message in messages)
     assert [share for share in ("50 %", "25 %") if f"less than {share} of it is left" in "".join(messages)]
-    until(lambda: len(receiver.bodies) >= len(events(client)))
+    raised = sorted(event["event_id"] for event in events(client))
+    until(lambda: len(receiver.bodies) >= len(raised))
+    assert sorted(sent["event"]["event_id"] for sent in receiver.bodies) == raised, "each of them once"
     assert {sent["type"] for sent in receiver.bodies} == {"alarm.raised"}, "what takes another's place is not over"
 
 

@@ -210,20 +210,14 @@ def _restarted(bench: Bench) -> None:
     assert likely == {f"t{k}": 500 * k for k in range(6, 10)}
     who = {"reason": "it was exchanged", "by": "me", "at": AT}
     revision = revision_of(bench)
-    mended = list(
-        map(as_answered, change_run.change(bench.database, CLUTCH, held, action=changes.CORRECT, cycles=likely, **who))
-    )
+    correcting = {"action": changes.CORRECT, **who}
+    mended = map(as_answered, change_run.change(bench.database, CLUTCH, held, cycles=likely, **correcting))
     assert {one["run_id"]: (one["state"], one["cycles"]) for one in mended} == {
         name: ("accepted", cycles) for name, cycles in likely.items()
     }
     assert revision_of(bench) == revision + 1
     sent_cycles = {name: float(before[name]["cycles"]) for name in held}
-    undone = list(
-        map(
-            as_answered,
-            change_run.change(bench.database, CLUTCH, held, action=changes.CORRECT, cycles=sent_cycles, **who),
-        )
-    )
+    undone = map(as_answered, change_run.change(bench.database, CLUTCH, held, cycles=sent_cycles, **correcting))
     assert {one["run_id"]: (one["state"], one["doubts"]) for one in undone} == {
         name: ("held", before[name]["doubts"]) for name in held
     }
@@ -234,9 +228,9 @@ def test_several_runs_are_withdrawn_and_restored_in_one_step(bench: Bench) -> No
     names, who = ["a1000", "a2000"], {"reason": "another clutch's", "by": "me", "at": AT}
     before = bench.receipts()
     out = change_run.change(bench.database, CLUTCH, names, action=changes.WITHDRAW, **who)
-    assert [one.state for one in out] == ["withdrawn", "withdrawn"]
+    assert [receipt.state for receipt in out] == ["withdrawn", "withdrawn"]
     back = change_run.change(bench.database, CLUTCH, names, action=changes.RESTORE, **who)
-    assert [one.state for one in back] == ["accepted", "accepted"]
+    assert [receipt.state for receipt in back] == ["accepted", "accepted"]
     assert bench.receipts() == before
 
 

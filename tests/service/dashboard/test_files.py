@@ -200,7 +200,8 @@ def test_the_site_is_served_and_where_none_was_built_the_answer_says_how(tmp_pat
     app = FastAPI()
     app.include_router(site.router(tmp_path / "missing"))
     answer = TestClient(app).get("/help/")
-    assert (answer.status_code, "make docs" in answer.text) == (404, True)
+    assert (answer.status_code, answer.headers["content-type"]) == (404, "text/html; charset=utf-8")
+    assert "Run <code>make docs</code>" in answer.text
     pages_built = {"index.html": "<p>first</p>", "how-to/index.html": "<p>tasks</p>", "searchindex.js": "1"}
     app = FastAPI()
     app.include_router(site.router(written(tmp_path, pages_built | {"objects.inv": "no page"})))

@@ -2,7 +2,7 @@
 
 import tempfile
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from functools import partial
 from pathlib import Path
 from typing import Any, NoReturn
@@ -13,9 +13,8 @@ from fastapi import Request
 from fastapi.testclient import TestClient
 from httpx2 import Client
 
-from service.answers import series
+from service.answers import series, store
 from service.web import auth, responses
-from service.web.middleware import Polls
 from storage.engine.errors import DatabaseBusy
 from storage.engine.opening import open_database
 from storage.engine.sqlite.database import back_up
@@ -107,11 +106,11 @@ def test_an_unknown_clutch_is_unknown_however_often_it_is_asked_for_and_whatever
 ) -> None:
     asked = []
 
-    def kept(_database: object, query: Callable[..., object], clutch_id: str) -> tuple[int, bytes]:
+    def kept(self: store.AnswerStore, key: Hashable, query: Callable[..., object], clutch_id: str) -> None:
         asked.append((query.__name__, clutch_id))
-        return 0, b'{"items":[]}'
+        self.begin(key, 0, b'{"items":[]}')
 
-    monkeypatch.setattr(responses, "shared_answer", kept)
+    monkeypatch.setattr(store.AnswerStore, "begin_shared", kept)
     for name in ASKED:
         assert [client.get(f"/v1/clutches/nobody/{name}").status_code for _ in range(2)] == [404, 404]
     assert asked == []
@@ -224,15 +223,15 @@ def test_a_number_is_one_entry_however_it_is_written(polled: TestClient, routed:
     """3,000 spellings of one number added 142 MiB outside every bound."""
     address = "/v1/clutches/c1/remaining-useful-life"
     assert polled.get(f"{address}?at_cycles=0&method=particle").status_code == 200
-    index = polls_of(polled)
-    entries = len(index._polls)
+    index = polled.app.state.context.answers._asked  # type: ignore[attr-defined]
+    entries = len(index)
     routed.clear()
     answers = set()
     for spelled in ("0", "0.0", "0e9", "-0", "+0", "00", "0.000000000000000000000000", " 0"):
         for query in (f"at_cycles={quote(spelled)}", f"method=particle&at_cycles={quote(spelled)}"):
             answers.add(polled.get(f"{address}?{query}").content)
     assert len(answers) == 1
-    assert (len(index._polls), routed) == (entries, [])
+    assert (len(index), routed) == (entries, [])
 
 
 def test_what_cannot_be_a_number_is_refused_by_its_length(client: TestClient) -> None:
@@ -258,14 +257,6 @@ def test_many_spellings_take_no_memory(tmp_path: Path) -> None:
             assert http.get(f"/v1/clutches/{'c' * 40_000}{number}").status_code == 404
             assert ask(headers={"Authorization": f"Bearer{' ' * 40_000}{number}"}).status_code == 200
         assert resident(server.pid) - before < 24 << 20
-
-
-def polls_of(client: TestClient) -> Polls:
-    """The index in the application's stack of middleware."""
-    layer: Any = client.app.middleware_stack  # type: ignore[attr-defined]
-    while not isinstance(layer, Polls):
-        layer = layer.app
-    return layer
 
 
 def test_a_database_that_cannot_be_read_is_said_to_be(polled: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -10,12 +10,11 @@ from typing import Any
 
 import pytest
 
-from service.answers import cache as caches
-from service.answers.cache import (
-    AnswerCache,
+from service.answers import store as caches
+from service.answers.store import (
+    AnswerStore,
     CachedAnswer,
     Made,
-    Revalidation,
     build_of,
     revision_and_json,
     shared_answer,
@@ -37,7 +36,7 @@ def bodies_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(caches, "KEPT_BESIDE_BYTES", 0)
 
 
-def made(cache: AnswerCache, name: str, body: bytes) -> bool:
+def made(cache: AnswerStore, name: str, body: bytes) -> bool:
     """Whether the answer had to be made."""
     calls = []
 
@@ -56,13 +55,13 @@ class Named(Answer):
 
 def test_the_least_lately_asked_for_goes_first_and_no_more_than_must() -> None:
     assert MAX_CACHED_BYTES < 2**27
-    cache = AnswerCache(10)
+    cache = AnswerStore(10)
     assert [made(cache, name, name.encode() * size) for name, size in (("a", 4), ("b", 4), ("c", 2))] == [True] * 3
     assert not made(cache, "a", b"aaaa")  # b is now the one not asked for longest
     assert made(cache, "d", b"ddd")
     assert [made(cache, "a", b"aaaa"), made(cache, "c", b"cc"), made(cache, "d", b"ddd")] == [False] * 3
     assert made(cache, "b", b"bbbb")
-    cache = AnswerCache(8)
+    cache = AnswerStore(8)
     assert [made(cache, name, b"four") for name in ("a", "b")] == [True] * 2
     assert cache.held("a", 1) is not None  # a poll counts as asking, too
     assert made(cache, "c", b"four")
@@ -70,7 +69,7 @@ def test_the_least_lately_asked_for_goes_first_and_no_more_than_must() -> None:
 
 
 def test_an_answer_larger_than_all_may_be_together_is_given_and_not_kept() -> None:
-    cache = AnswerCache(10)
+    cache = AnswerStore(10)
     assert made(cache, "small", b"s")
     assert [made(cache, "large", b"l" * 11) for _ in range(2)] == [True, True]
     assert not made(cache, "small", b"s")
@@ -78,7 +77,7 @@ def test_an_answer_larger_than_all_may_be_together_is_given_and_not_kept() -> No
 
 def test_answers_without_a_body_take_room_too(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(caches, "KEPT_BESIDE_BYTES", 10)
-    cache = AnswerCache(100)
+    cache = AnswerStore(100)
     for number in range(50):
         made(cache, str(number), b"")
     assert sum(cache.held(str(number), 1) is not None for number in range(50)) == 10
@@ -98,7 +97,7 @@ class Slow:
 
 
 def test_of_several_that_ask_at_once_one_computes() -> None:
-    cache, slow = AnswerCache(100), Slow()
+    cache, slow = AnswerStore(100), Slow()
     with ThreadPoolExecutor(4) as pool:
         first = pool.submit(cache.answer, "a", 1, slow)
         assert slow.started.wait(30)
@@ -110,7 +109,7 @@ def test_of_several_that_ask_at_once_one_computes() -> None:
 
 
 def test_of_a_key_one_version_is_held_and_counted() -> None:
-    cache = AnswerCache(10)
+    cache = AnswerStore(10)
     for version in range(20):
         assert cache.held("a", version) is None
         assert cache.answer("a", version, lambda: b"aaaa").body == b"aaaa"
@@ -121,7 +120,7 @@ def test_of_a_key_one_version_is_held_and_counted() -> None:
 
 
 def test_a_slow_old_version_does_not_replace_a_newer_one() -> None:
-    cache, old = AnswerCache(100), Slow()
+    cache, old = AnswerStore(100), Slow()
     with ThreadPoolExecutor(1) as pool:
         slow = pool.submit(cache.answer, "a", 1, old)
         assert old.started.wait(30)
@@ -133,7 +132,7 @@ def test_a_slow_old_version_does_not_replace_a_newer_one() -> None:
 
 
 def test_what_fails_fails_for_all_and_is_tried_again() -> None:
-    cache = AnswerCache(100)
+    cache = AnswerStore(100)
 
     def failing() -> bytes:
         raise LookupError("not there")
@@ -155,30 +154,30 @@ def test_no_number_leaves_that_json_cannot_carry() -> None:
 def test_of_several_services_on_a_server_one_computes(on_server: Database) -> None:
     computed: list[str] = []
 
-    def count(_: Database, clutch_id: str, *arguments: str) -> dict[str, int]:
+    def count(_: Database, clutch_id: str, *arguments: str) -> Named:
         computed.append(clutch_id)
-        return {"computed": len(computed), "arguments": len(arguments)}
+        return Named(name=f"{len(arguments)} arguments", value=len(computed))
 
     write_to(on_server, clutches.insert, clutch_row("c1"))
     with closing(open_database(on_server.url)) as other:
         assert shared_answer(other, count, "c1") is None
         first = revision_and_json(on_server, count, "c1", ())
-        assert first == (0, b'{"computed":1,"arguments":0}')
+        assert first == (0, b'{"name":"0 arguments","value":1}')
         assert revision_and_json(other, count, "c1", ()) == first
         assert shared_answer(other, count, "c1") == first
         with on_server.writing(of="c1") as connection:
             clutches.bump_revision(connection, "c1")
         assert shared_answer(other, count, "c1") == first
-        assert revision_and_json(other, count, "c1", ()) == (1, b'{"computed":2,"arguments":0}')
+        assert revision_and_json(other, count, "c1", ()) == (1, b'{"name":"0 arguments","value":2}')
         # with arguments, of which there are any number, nothing is kept
-        assert revision_and_json(on_server, count, "c1", ("ukf",)) == (1, b'{"computed":3,"arguments":1}')
-        assert revision_and_json(other, count, "c1", ("ukf",)) == (1, b'{"computed":4,"arguments":1}')
+        assert revision_and_json(on_server, count, "c1", ("ukf",)) == (1, b'{"name":"1 arguments","value":3}')
+        assert revision_and_json(other, count, "c1", ("ukf",)) == (1, b'{"name":"1 arguments","value":4}')
     assert len(computed) == 4
 
 
 def test_another_build_of_the_release_computes_for_itself(on_server: Database, monkeypatch: pytest.MonkeyPatch) -> None:
-    def query(_: Database, clutch_id: str) -> dict[str, str]:
-        return {"clutch_id": clutch_id, "computed_by": caches.BUILD}
+    def query(_: Database, clutch_id: str) -> Named:
+        return Named(name=f"{clutch_id} by {caches.BUILD}")
 
     write_to(on_server, clutches.insert, clutch_row("c1"))
     _, first = revision_and_json(on_server, query, "c1", ())
@@ -247,12 +246,12 @@ async def _settled() -> None:
         await asyncio.sleep(0)
 
 
-def scenario(test: Callable[[Revalidation, Worker], Awaitable[None]]) -> Callable[[], None]:
+def scenario(test: Callable[[AnswerStore, Worker], Awaitable[None]]) -> Callable[[], None]:
     """A test in a loop of its own, with room for two answers of 4 bytes."""
 
     def run() -> None:
         async def whole() -> None:
-            await asyncio.wait_for(test(Revalidation(AnswerCache(8)), Worker()), 30)
+            await asyncio.wait_for(test(AnswerStore(8), Worker()), 30)
 
         asyncio.run(whole())
 
@@ -260,21 +259,21 @@ def scenario(test: Callable[[Revalidation, Worker], Awaitable[None]]) -> Callabl
 
 
 @scenario
-async def test_the_first_answer_is_waited_for_and_made_once(kept: Revalidation, worker: Worker) -> None:
-    waiting = [asyncio.create_task(kept.answer("a", 1, worker.compute, wait=0)) for _ in range(3)]
+async def test_the_first_answer_is_waited_for_and_made_once(kept: AnswerStore, worker: Worker) -> None:
+    waiting = [asyncio.create_task(kept.renewed("a", 1, worker.compute, wait=0)) for _ in range(3)]
     await _settled()
     assert not any(task.done() for task in waiting)
     await worker.gives(1, b"one")
     assert {task.result() for task in waiting} == {(1, CachedAnswer.of(b"one"))}
-    assert await kept.answer("a", 1, worker.compute, wait=0) == (1, CachedAnswer.of(b"one"))
+    assert await kept.renewed("a", 1, worker.compute, wait=0) == (1, CachedAnswer.of(b"one"))
     assert len(worker.asked) == 1
-    assert kept._cache.held("a", 1) == CachedAnswer.of(b"one")
-    assert kept._cache.held("a", 2) is None
+    assert kept.held("a", 1) == CachedAnswer.of(b"one")
+    assert kept.held("a", 2) is None
 
 
-async def _held_at_one(kept: Revalidation, worker: Worker) -> None:
+async def _held_at_one(kept: AnswerStore, worker: Worker) -> None:
     """An answer of revision 1 is there."""
-    first = await _asking(kept.answer("a", 1, worker.compute, wait=0))
+    first = await _asking(kept.renewed("a", 1, worker.compute, wait=0))
     await worker.gives(1, b"one")
     assert (await first)[0] == 1
 
@@ -287,24 +286,24 @@ async def _asking(asked: Coroutine[Any, Any, Asked]) -> "asyncio.Task[Asked]":
 
 
 @scenario
-async def test_who_does_not_wait_gets_the_last_one_while_the_next_is_made(kept: Revalidation, worker: Worker) -> None:
+async def test_who_does_not_wait_gets_the_last_one_while_the_next_is_made(kept: AnswerStore, worker: Worker) -> None:
     await _held_at_one(kept, worker)
     for revision in (2, 3):
-        assert await kept.answer("a", revision, worker.compute, wait=0) == (1, CachedAnswer.of(b"one"))
+        assert await kept.renewed("a", revision, worker.compute, wait=0) == (1, CachedAnswer.of(b"one"))
     assert worker.waited_for == [True, False]  # one renewal for both
     await worker.gives(2, b"two")
-    assert await kept.answer("a", 2, worker.compute, wait=0) == (2, CachedAnswer.of(b"two"))
+    assert await kept.renewed("a", 2, worker.compute, wait=0) == (2, CachedAnswer.of(b"two"))
 
 
 @scenario
 async def test_who_waits_does_not_wait_for_a_renewal_that_yields_to_all_others(
-    kept: Revalidation, worker: Worker
+    kept: AnswerStore, worker: Worker
 ) -> None:
     await _held_at_one(kept, worker)
-    assert await kept.answer("a", 2, worker.compute, wait=0) == (1, CachedAnswer.of(b"one"))
+    assert await kept.renewed("a", 2, worker.compute, wait=0) == (1, CachedAnswer.of(b"one"))
     renewal = worker.asked[-1]
-    assert await kept.answer("a", 3, worker.compute, wait=0.01) == (1, CachedAnswer.of(b"one"))
-    patient = [asyncio.create_task(kept.answer("a", 3, worker.compute, wait=20)) for _ in range(3)]
+    assert await kept.renewed("a", 3, worker.compute, wait=0.01) == (1, CachedAnswer.of(b"one"))
+    patient = [asyncio.create_task(kept.renewed("a", 3, worker.compute, wait=20)) for _ in range(3)]
     await _settled()
     assert worker.waited_for == [True, False, True]  # one for all who wait
     await worker.gives(2, b"two")
@@ -314,18 +313,18 @@ async def test_who_waits_does_not_wait_for_a_renewal_that_yields_to_all_others(
     assert {await task for task in patient} == {(3, CachedAnswer.of(b"3rd"))}
     renewal.set_result((2, b"old"))
     await _settled()
-    assert kept._cache.held("a", 3) == CachedAnswer.of(b"3rd")  # the slower and older one replaces nothing
+    assert kept.held("a", 3) == CachedAnswer.of(b"3rd")  # the slower and older one replaces nothing
 
 
 @scenario
 async def test_who_waits_takes_a_quicker_renewal_and_does_not_hear_of_its_failure(
-    kept: Revalidation, worker: Worker
+    kept: AnswerStore, worker: Worker
 ) -> None:
     await _held_at_one(kept, worker)
     for revision, error in ((2, None), (3, LookupError("not there"))):
-        await kept.answer("a", revision, worker.compute, wait=0)
+        await kept.renewed("a", revision, worker.compute, wait=0)
         renewal = worker.asked[-1]
-        patient = await _asking(kept.answer("a", revision, worker.compute, wait=20))
+        patient = await _asking(kept.renewed("a", revision, worker.compute, wait=20))
         if error is None:
             renewal.set_result((revision, b"idle"))
             assert await patient == (revision, CachedAnswer.of(b"idle"))
@@ -338,28 +337,28 @@ async def test_who_waits_takes_a_quicker_renewal_and_does_not_hear_of_its_failur
 
 
 @scenario
-async def test_what_fails_is_told_to_those_who_wait_and_tried_again(kept: Revalidation, worker: Worker) -> None:
-    first = await _asking(kept.answer("a", 1, worker.compute, wait=0))
+async def test_what_fails_is_told_to_those_who_wait_and_tried_again(kept: AnswerStore, worker: Worker) -> None:
+    first = await _asking(kept.renewed("a", 1, worker.compute, wait=0))
     worker.asked[-1].set_exception(LookupError("not there"))
     with pytest.raises(LookupError, match="not there"):
         await first
     await _held_at_one(kept, worker)
-    waiting = await _asking(kept.answer("a", 2, worker.compute, wait=20))
+    waiting = await _asking(kept.renewed("a", 2, worker.compute, wait=20))
     worker.asked[-1].set_exception(LookupError("not now"))
     with pytest.raises(LookupError, match="not now"):
         await waiting
-    assert await kept.answer("a", 2, worker.compute, wait=0) == (1, CachedAnswer.of(b"one"))
+    assert await kept.renewed("a", 2, worker.compute, wait=0) == (1, CachedAnswer.of(b"one"))
 
 
 @scenario
-async def test_what_is_being_made_is_not_made_twice_to_make_room(kept: Revalidation, worker: Worker) -> None:
+async def test_what_is_being_made_is_not_made_twice_to_make_room(kept: AnswerStore, worker: Worker) -> None:
     kept.begin("renewed", 1, b"four")
-    assert await kept.answer("renewed", 2, worker.compute, wait=0) == (1, CachedAnswer.of(b"four"))
-    first = await _asking(kept.answer("made", 1, worker.compute, wait=0))
+    assert await kept.renewed("renewed", 2, worker.compute, wait=0) == (1, CachedAnswer.of(b"four"))
+    first = await _asking(kept.renewed("made", 1, worker.compute, wait=0))
     for name in ("a", "b", "c"):
         kept.begin(name, 1, b"four")
-    second = asyncio.create_task(kept.answer("made", 1, worker.compute, wait=0))
-    assert await kept.answer("renewed", 2, worker.compute, wait=0) == (1, CachedAnswer.of(b"four"))
+    second = asyncio.create_task(kept.renewed("made", 1, worker.compute, wait=0))
+    assert await kept.renewed("renewed", 2, worker.compute, wait=0) == (1, CachedAnswer.of(b"four"))
     await _settled()
     assert [name for name in ("renewed", "made", "a", "b", "c") if kept.knows(name)] == ["renewed", "made", "c"]
     await worker.gives(1, b"one")

@@ -1,7 +1,8 @@
-"""The cache of computed answers: each answer is computed once and shared between threads.
+"""The store of answers: each is computed once for a version of what it follows from, and kept while there is room.
 
-Where several ask for an answer that is not there yet, one computes it and the others wait for it. What takes a second to
-compute is given as it was while a newer one is made (`Revalidation`).
+Where several ask for an answer that is not there yet, one computes it and the others wait for it (`answer`). What takes a
+second to compute is given as it was while a worker makes a newer one (`renewed`). What was asked at an address before is
+answered without looking at anything else (`again`). Services on one database share what workers have computed.
 """
 
 import asyncio
@@ -15,7 +16,7 @@ from concurrent.futures import Future
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from pydantic import BaseModel
 
@@ -27,6 +28,10 @@ from storage import clutches
 from storage.encoding import to_text
 from storage.engine.database import Database, SharedAnswer
 from storage.engine.errors import StorageError
+
+if TYPE_CHECKING:
+    from starlette.requests import Request
+    from starlette.responses import Response
 
 _log = logging.getLogger("clutchlife")
 
@@ -123,32 +128,41 @@ def shared_answer(database: Database, query: Callable[..., object], clutch_id: s
     return None if newest is None else (newest.revision, newest.body)
 
 
-class AnswerCache:
+#: What a worker returns: the revision that it computed the answer from, and the answer's bytes.
+Made = tuple[int, bytes]
+Compute = Callable[[bool], "Future[Made]"]
+_Making = asyncio.Task[tuple[int, CachedAnswer]]
+#: The held answer to a request that was made before, None where there is none for the present version.
+Again: TypeAlias = "Callable[[Request], Response | None]"
+
+
+class AnswerStore:
     """The last answers; the least lately asked for goes first. `most_bytes` bounds their sizes together.
 
     Of each key the answer of one version is held, that whose making began last: one that was superseded is not asked for
-    again. What is `pinned` stays: its next answer is being made, and its last one is given meanwhile.
+    again. What a worker is renewing stays: its last answer is given meanwhile.
     """
 
-    def __init__(self, most_bytes: int) -> None:
+    def __init__(self, most_bytes: int, database: Database | None = None) -> None:
         self._most = most_bytes
+        self._database = database
         self._held = 0
         self._begun = 0
-        self.pinned: set[Hashable] = set()
         self._answers: OrderedDict[Hashable, tuple[Hashable, CachedAnswer, int]] = (
             OrderedDict()
         )  # and which begin it was
         self._making: dict[tuple[Hashable, Hashable], Future[CachedAnswer]] = {}
         self._lock = threading.Lock()
+        # of a key one may be made for those who wait and one for later, both at once: who waits does not wait for a
+        # renewal, which yields to all others; used from the event loop alone
+        self._waited_for: dict[Hashable, _Making] = {}
+        self._renewing: dict[Hashable, _Making] = {}
+        self._asked: OrderedDict[Hashable, Again] = OrderedDict()
 
     def held(self, key: Hashable, version: Hashable) -> CachedAnswer | None:
         """The answer for `key` where it is there and of `version`."""
         with self._lock:
             return self._current(key, version)
-
-    def __contains__(self, key: Hashable) -> bool:
-        with self._lock:
-            return key in self._answers
 
     def newest(self, key: Hashable) -> tuple[Any, CachedAnswer] | None:
         """The answer for `key`, of whichever version, and that version; None where none is there."""
@@ -214,7 +228,7 @@ class AnswerCache:
             self._held += answer.size
             self._answers[key] = version, answer, begun
         while self._held > self._most:
-            oldest = next((name for name in self._answers if name not in self.pinned and name != key), None)
+            oldest = next((name for name in self._answers if name != key and not self._is_renewed(name)), None)
             if oldest is None:
                 break
             self._drop(oldest)
@@ -223,47 +237,33 @@ class AnswerCache:
         if key in self._answers:
             self._held -= self._answers.pop(key)[1].size
 
-
-#: What a worker returns: the revision that it computed the answer from, and the answer's bytes.
-Made = tuple[int, bytes]
-Compute = Callable[[bool], "Future[Made]"]
-_Making = asyncio.Task[tuple[int, CachedAnswer]]
-
-
-class Revalidation:
-    """Has a worker make the next answers that the cache holds by clutch and revision. Used from the event loop alone.
-
-    As stale-while-revalidate of RFC 5861: where the workers are idle, who asks waits a while for the newest answer; where
-    they have more to do, the last one is given at once. `Prefer: wait=SECONDS` waits in any case.
-
-    Of a key one may be made for those who wait and one for later, both at once: who waits does not wait for a renewal, which
-    yields to all others.
-    """
-
-    def __init__(self, cache: AnswerCache) -> None:
-        self._cache = cache
-        self._making: dict[Hashable, _Making] = {}
-        self._renewing: dict[Hashable, _Making] = {}
-
     def knows(self, key: Hashable) -> bool:
         """Whether an answer is held, of whichever revision, or is being made."""
-        return key in self._making or key in self._renewing or key in self._cache
+        return self._is_renewed(key) or self.newest(key) is not None
 
     def begin(self, key: Hashable, revision: int, body: bytes) -> None:
         """Hold an answer that was made elsewhere, where none is known."""
         if not self.knows(key):
-            self._cache.put(key, revision, CachedAnswer.of(body))
+            self.put(key, revision, CachedAnswer.of(body))
 
-    async def answer(self, key: Hashable, revision: int, compute: Compute, *, wait: float) -> tuple[int, CachedAnswer]:
-        """The answer at `revision` or later, or the last one where it is not there within `wait` [s]; and its revision.
+    def begin_shared(self, key: Hashable, query: Callable[..., object], clutch_id: str) -> None:
+        """Hold what a service on this database has computed last of a query without arguments, where nothing is known."""
+        if self._database is not None and not self.knows(key):
+            shared = shared_answer(self._database, query, clutch_id)
+            if shared is not None:
+                self.begin(key, *shared)
+
+    async def renewed(self, key: Hashable, revision: int, compute: Compute, *, wait: float) -> tuple[int, CachedAnswer]:
+        """The answer at `revision` or later, or the last one where it is not there within `wait` [s]; and its revision. As
+        stale-while-revalidate of RFC 5861; used from the event loop alone.
 
         Where none was ever made, it is waited for. `compute` is told whether who asks waits; what it raises is raised to
         those who do.
         """
         deadline = asyncio.get_running_loop().time() + wait
-        newest = self._cache.newest(key)
+        newest = self.newest(key)
         while newest is None or newest[0] < revision:
-            making, renewing = self._making.get(key), self._renewing.get(key)
+            making, renewing = self._waited_for.get(key), self._renewing.get(key)
             if newest is None:
                 newest = await asyncio.shield(making or self._begin(key, compute, waits=True))
                 continue
@@ -287,27 +287,37 @@ class Revalidation:
 
     def _begin(self, key: Hashable, compute: Compute, *, waits: bool) -> _Making:
         """Have the next answer made, for one who waits or for later. Raises BusyError."""
-        tasks = self._making if waits else self._renewing
-        task = tasks[key] = asyncio.create_task(self._make(key, compute(waits), tasks))
-        self._cache.pinned.add(key)
+        tasks = self._waited_for if waits else self._renewing
+        task = tasks[key] = asyncio.create_task(self._computed(key, compute(waits), tasks))
         task.add_done_callback(_logged)
         return task
 
-    async def _make(
+    async def _computed(
         self, key: Hashable, computing: "Future[Made]", tasks: dict[Hashable, _Making]
     ) -> tuple[int, CachedAnswer]:
         try:
             revision, body = await asyncio.wrap_future(computing)
         finally:
             del tasks[key]
-            if key not in self._making and key not in self._renewing:
-                self._cache.pinned.discard(key)
-        cached = self._cache.newest(key)
+        cached = self.newest(key)
         if cached is not None and revision < cached[0]:  # a later one was quicker
             return cached
         result = revision, CachedAnswer.of(body)
-        self._cache.put(key, *result)
+        self.put(key, *result)
         return result
+
+    def _is_renewed(self, key: Hashable) -> bool:
+        return key in self._waited_for or key in self._renewing
+
+    def remember(self, asked: Hashable, again: Again, most: int) -> None:
+        """Answer what was asked by `again` from now on, for what was asked for last, at `most` so many."""
+        self._asked[asked] = again
+        while len(self._asked) > most:
+            self._asked.popitem(last=False)
+
+    def again(self, asked: Hashable) -> "Again | None":
+        """What answers what was asked before, None where it was not."""
+        return self._asked.get(asked)
 
 
 def _failed(task: _Making) -> bool:
