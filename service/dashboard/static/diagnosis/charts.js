@@ -166,8 +166,22 @@ function lawTraces(curve, place, c) {
   return [
     { ...edge, y: end(-1) },
     { ...edge, y: end(1), fill: "tonexty", fillcolor: `${c.accent}33` },
-    { ...axes, ...legend, name: "measured", y: curve.measured_nm, mode: "markers", marker: { size: 4, color: c.quiet } },
-    { ...axes, ...legend, name: "eq. 3", y: curve.eq3_nm, mode: "lines", line: { width: 2, color: c.worn, dash: "dash" } },
+    {
+      ...axes,
+      ...legend,
+      name: "measured",
+      y: curve.measured_nm,
+      mode: "markers",
+      marker: { size: 4, color: c.quiet },
+    },
+    {
+      ...axes,
+      ...legend,
+      name: "eq. 3",
+      y: curve.eq3_nm,
+      mode: "lines",
+      line: { width: 2, color: c.worn, dash: "dash" },
+    },
     { ...axes, ...legend, name: "law as found", y: curve.law_nm, mode: "lines", line: { width: 2, color: c.accent } },
   ];
 }
