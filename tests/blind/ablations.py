@@ -104,8 +104,9 @@ def stored(trial: Trial, ablate: str) -> dict[str, Outcome]:
 
 
 def good(one: Outcome) -> bool:
-    """Nothing called adequate, an effect named right, what is left out or uncatalogued neither named nor overlooked."""
-    if not one.truth or one.trial.row.startswith("none"):
+    """Nothing, or another law, called adequate, an effect named right, what is left out or uncatalogued neither named nor
+    overlooked."""
+    if not one.truth or one.trial.row.startswith(("none", "law/")):
         return one.verdict == "model_adequate"
     if one.trial.row.startswith(("left/", "outside/")):
         return not one.named and one.verdict != "model_adequate"

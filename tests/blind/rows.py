@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tests.blind.rig.makers import CATALOGUED, HISTORY, OUTSIDE
+from tests.blind.rig.makers import CATALOGUED, HISTORY, LAWS, OUTSIDE
 from tests.blind.trials import Outcome, Trial, trial
 from tests.measuring import Asked
 
@@ -79,6 +79,8 @@ def trials(seed: int, size: float = 1.0) -> list[Trial]:
             add(f"loud/{lam:.0f}/{slug}", some(20), slug, lam=lam, **loops)
     for slug in OUTSIDE:
         add(f"outside/{slug}", some(20), slug, lam=50.0)
+    for slug in LAWS:
+        add(f"law/{slug}", some(40), slug, lam=80.0, mixed=True)
     made += [trial("two", seed, k, *pair, lam=50.0) for k, pair in enumerate(drawn_pairs(seed, some(100)))]
     many, few = some(30), some(30) // 3 or 1
     for lam in (50.0, 200.0):
@@ -167,6 +169,8 @@ def counts() -> list[Count]:
         Count("outside the catalogue, λ = 50: `unexplained_structure`", "outside/", lambda o: o.unexplained, 0.80),
         Count("… with the right axis first", "outside/", lambda o: o.right_axis, 0.80, among=lambda o: o.unexplained),
         Count("… named", "outside/", lambda o: o.named, most=0.02),
+        Count("another friction law, λ = 80 beside eq. 3: `model_adequate`", "law/", lambda o: not _alarm(o), 0.85),
+        Count("… named", "law/", lambda o: o.named, most=0.03),
         Count("left out of the catalogue, λ = 50: named as something else", "left/", lambda o: o.named, most=0.10),
         Count("… unexplained or ambiguous", "left/", lambda o: o.unexplained or o.ambiguous, 0.80),
         Count("two effects, λ = 50 each: both in the set", "two", lambda o: o.in_set, 0.85),

@@ -23,7 +23,7 @@ def test_only_what_fell_short_is_asked_about() -> None:
 
 def test_a_change_imitates_itself_and_its_nearest_cousin_imitates_the_greater_part() -> None:
     """The exponent at λ = 80: drag leaves 9 nats of it, the baseline alone 80."""
-    trial = Trial("loud/80/viscous_exponent", (1, 2, 3), ("viscous_exponent",), 80.0)
+    trial = Trial("law/viscous_exponent", (1, 2, 3), ("viscous_exponent",), 80.0)
     hidden = trial.hidden()
     ((effect, amplitude),) = hidden.effects
     ear = listen(hidden.plan, hidden.clutch, hidden.sensor)

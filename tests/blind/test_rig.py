@@ -36,7 +36,7 @@ ALLOWED = {
 #: Loops say nothing of them that plateaus do not, and make the refits long.
 STEADY = {"running_in", "accelerated_wear", "pressure_offset", "torque_zero_shift", "interface_heating", "seasons"}
 CONTRACT = {
-    "oil_temperature", "interface_heating", "viscous_exponent", "hydrodynamic_drag", "torque_zero_shift",
+    "oil_temperature", "interface_heating", "hydrodynamic_drag", "torque_zero_shift",
     "pressure_offset", "unsettled_dwell", "channel_delay", "inertia_torque", "squeeze_film", "shaft_ripple",
     "stick_slip", "running_in", "oil_change", "accelerated_wear", "load_severity", "rest_recovery",
 }  # fmt: skip

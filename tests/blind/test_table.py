@@ -8,7 +8,7 @@ from models.diagnosis.validation.held_out import Gain
 from tests.blind import __main__ as blind
 from tests.blind import table
 from tests.blind.rig.loudness import UnreachableError
-from tests.blind.rig.makers import CATALOGUED, OUTSIDE
+from tests.blind.rig.makers import CATALOGUED, LAWS, OUTSIDE
 from tests.blind.rows import counts, trials
 from tests.blind.trials import Outcome, Trial, judge
 
@@ -16,8 +16,8 @@ from tests.blind.trials import Outcome, Trial, judge
 def all_knowing(trial: Trial) -> Outcome:
     """What a perfect diagnosis says."""
     verdict, causes, where = "cause_named", frozenset(trial.slugs), ()
-    if not trial.slugs:
-        verdict = "model_adequate"
+    if set(trial.slugs) <= LAWS.keys():  # or nothing
+        verdict, causes = "model_adequate", frozenset()
     elif trial.without or not set(trial.slugs) <= CATALOGUED.keys():
         verdict, causes, where = "unexplained_structure", frozenset(), ("cycles",)
     elif "oil" in trial.wanted:

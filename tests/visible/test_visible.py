@@ -27,7 +27,7 @@ def test_nine_in_ten_of_what_is_visible_raise_an_alarm() -> None:
     """Not all of them can be hidden: an amplitude may be beyond what makes sense on the rig."""
     slugs = ("hydrodynamic_drag", "unsettled_dwell", "inertia_torque", "running_in", "oil_change", "accelerated_wear")
     found = [shown((20262, k), slug) for k in range(5) for slug in slugs]
-    found += [shown((20261, 3), slug) for slug in ("oil_temperature", "viscous_exponent")]
+    found += [shown((20261, 3), slug) for slug in ("oil_temperature", "interface_heating")]
     assert all(isinstance(each, Shown) and each.seen for each in found[-2:])
     seen = [each.seen for each in found if isinstance(each, Shown)]
     assert len(seen) >= 15

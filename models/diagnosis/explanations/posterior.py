@@ -340,6 +340,10 @@ class Search:
         refits = [fitted for one in laws if (fitted := refit(self.problem, one, effects)) is not None]
         fitted = min(refits, key=lambda one: one.cost, default=None)
         node = None if fitted is None else self._node(fitted, alternative.causes, shape_evidence)
+        if node is not None and (problem := self._suiting(node)).noise.law != self.problem.noise.law:
+            # beside another law than is likely with its causes it was not expanded about what is likely
+            closer = refit(problem, node.fit.laws, node.fit.effects)
+            node = None if closer is None else self._node(closer, alternative.causes, shape_evidence)
         if node is None:
             return
         node = replace(node, promise=max(promise, node.log_evidence + self.prior(alternative)))
@@ -352,11 +356,16 @@ class Search:
         if first and len(effects) < 2 and not alternative.unknown:
             self._unscreened.add(alternative)
 
+    def _suiting(self, node: Node) -> FitProblem:
+        """The problem with the sizes of the law that are likeliest beside a node."""
+        likely = max(node.evidence.screened, key=lambda projected: projected.evidence)
+        return self.problem.with_noise(replace(self.problem.noise, law=likely.sizes))
+
     def _add_structure(self, alternative: Alternative, parent: Node, promise: float) -> None:
         """Add structure on an axis (`alternative.unknown`) beside a parent explanation. The baseline is refitted with the
         likeliest form of the structure taken off; `promise` is the log evidence [nats] that was expected."""
         axis = alternative.unknown
-        fitted = refit_beside(self.problem, parent.fit, parent.evidence.patterns[axis])
+        fitted = refit_beside(self._suiting(parent), parent.fit, parent.evidence.patterns[axis])
         node = None if fitted is None else self._node(fitted, alternative.causes, parent.shape_evidence, smooth=True)
         if node is not None and axis in node.evidence.structure:
             value = node.log_evidence + node.evidence.structure[axis]

@@ -433,7 +433,6 @@ HISTORY = frozenset({"running_in", "oil_change", "accelerated_wear", "load_sever
 CATALOGUED: dict[str, tuple[Maker, Wanted]] = {
     "oil_temperature": (oil_temperature, {"oil": True}),
     "interface_heating": (interface_heating, {}),
-    "viscous_exponent": (viscous_exponent, {}),
     "hydrodynamic_drag": (hydrodynamic_drag, {}),
     "torque_zero_shift": (torque_zero_shift, {"oil": True, "moments": True}),
     "pressure_offset": (pressure_offset, {}),
@@ -461,4 +460,7 @@ OUTSIDE: dict[str, tuple[Maker, Wanted]] = {
     "braking": (braking, {}),
 }
 
-ALL = CATALOGUED | OUTSIDE
+#: No cause, but another form of the friction law.
+LAWS: dict[str, tuple[Maker, Wanted]] = {"viscous_exponent": (viscous_exponent, {})}
+
+ALL = CATALOGUED | OUTSIDE | LAWS
