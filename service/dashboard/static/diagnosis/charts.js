@@ -162,7 +162,13 @@ function lawTraces(curve, place, c) {
   const legend = { showlegend: place === 0 };
   /** @type {(sign: number) => (number | null)[]} */
   const end = (sign) => curve.law_nm.map((torque, at) => (torque ?? 0) + sign * 1.645 * (curve.law_sd_nm[at] ?? 0));
-  const edge = { ...axes, mode: "lines", line: { width: 0, color: c.accent }, showlegend: false, hoverinfo: "skip" };
+  const edge = {
+    ...axes,
+    mode: "lines",
+    line: { width: 0, color: c.accent },
+    showlegend: false,
+    hoverinfo: /** @type {const} */ ("skip"),
+  };
   return [
     { ...edge, y: end(-1) },
     { ...edge, y: end(1), fill: "tonexty", fillcolor: `${c.accent}33` },
