@@ -166,7 +166,7 @@ def answered(service: Service, line: str) -> dict[str, Any] | None:
                 "capabilities": {"tools": {}},
                 "serverInfo": {"name": "clutchlife", "version": version("clutchlife")},
                 "instructions": "Condition monitoring of wet friction clutches. Every sentence about a clutch's state comes "
-                "from the service: quote it, do not judge anew.",
+                "from the service: quote it, do not judge it again.",
             }
         case "ping":
             result = {}
