@@ -224,9 +224,15 @@ def build_design(campaign: Campaign) -> Design:
         loops=len(loops),
         bin_autocorrelation=bin_autocorrelation([loop.autocorrelation for loop in loops]),
         runs=tuple(runs),
-        facts=facts_of(thinned_campaign),
+        facts=replace(facts_of(thinned_campaign), shortest_period=_shortest(points)),
         notes=tuple(notes),
     )
+
+
+def _shortest(points: Points) -> float | None:
+    """The shortest period of a loop [s]."""
+    frequencies = points.angular_frequency[~points.steady]
+    return float(2 * np.pi / frequencies.max()) if frequencies.size else None
 
 
 def _period_differences(

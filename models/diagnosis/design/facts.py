@@ -38,6 +38,8 @@ class Facts:
     last_moment: float | None = None
     usual_torque: float = criteria.USUAL_TORQUE  # medians over the closed clutch [Nm], [Pa]
     usual_pressure: float = criteria.USUAL_PRESSURE
+    lowest_pressure: float | None = None  # of the closed clutch [Pa]
+    shortest_period: float | None = None  # of a loop [s]
     # the plate's rise above the oil at no heat flux of friction [K], and what it rises by with that [K m²/W], if measured
     plate_warming: tuple[float, float] | None = None
     plate_in_all_tests: bool = False  # whether its temperature was measured in every test
@@ -96,6 +98,7 @@ def facts_of(campaign: Campaign) -> Facts:
         last_moment=span[1],
         usual_torque=max(float(np.median(torques)), 1e-9) if torques.size else criteria.USUAL_TORQUE,
         usual_pressure=max(float(np.median(pressures)), 1e-9) if pressures.size else criteria.USUAL_PRESSURE,
+        lowest_pressure=float(pressures.min()) if pressures.size else None,
         plate_warming=_plate_warming(campaign),
         plate_in_all_tests=bool(tests) and all(table.plate_temperature is not None for _, table in tests),
     )

@@ -94,6 +94,11 @@ def of_twice(exponent: float) -> float:
     return math.exp2(max(min(exponent, 100.0), -100.0))
 
 
+def within(most: float | None) -> tuple[float, float]:
+    """Bounds of either sign; none where the campaign does not say how much is the most."""
+    return (-math.inf, math.inf) if most is None else (-most, most)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tried:
     """One point of a shape grid and the log of its prior weight (weights need not sum to one)."""
@@ -117,7 +122,10 @@ class Effect:
     unit: str
     # its prior deviation in SI units (zero mean), for a clutch of the reference's size where it `grows_with` something
     prior_sd: float
-    positive: bool = False  # else either sign
+    # between which it lies, likewise; its prior ends there
+    lowest: float = -math.inf
+    highest: float = math.inf
+    between: Callable[[Facts], tuple[float, float]] | None = None  # the same where the campaign says them
     scale: float = 1.0  # turns the SI amplitude into `unit`
     felt: Felt | None = None  # the number that a sentence states
     shapes: tuple[ShapeParameter, ...] = ()
@@ -141,6 +149,7 @@ class Effect:
     axis: str = ""
     article: str = ""  # what stands before its name where it is the cause (`a`, `changed`)
     check: str = ""  # what to look at on the rig where it is the cause, after "Next: "
+    repair: str = ""  # what ends it, where an adopted model corrects for it
     states: str = ""  # the size in a sentence, {} in its place
     states_below: str = ""  # of a negative size, its amount in the place
     opposite_physics: str = ""  # a sentence for a negative amplitude, where `physics` holds for a positive one only
@@ -175,11 +184,23 @@ class Effect:
 
     def sized(self, facts: Facts) -> "Effect":
         """The effect with the prior that fits this campaign's clutch."""
-        if self.grows_with is None:
-            return self
-        of_torque = facts.usual_torque / criteria.USUAL_TORQUE
-        factor = of_torque if self.grows_with is Measure.TORQUE else facts.usual_pressure / criteria.USUAL_PRESSURE
-        return replace(self, prior_sd=self.prior_sd * factor)
+        factor = 1.0
+        if self.grows_with is Measure.TORQUE:
+            factor = facts.usual_torque / criteria.USUAL_TORQUE
+        elif self.grows_with is Measure.PRESSURE:
+            factor = facts.usual_pressure / criteria.USUAL_PRESSURE
+        lowest, highest = self.between(facts) if self.between else (factor * self.lowest, factor * self.highest)
+        return replace(self, prior_sd=factor * self.prior_sd, lowest=lowest, highest=highest)
+
+    @property
+    def positive(self) -> bool:
+        """Whether it has one sign."""
+        return self.lowest >= 0.0
+
+    def within(self, amplitude: float) -> float:
+        """The amplitude, or the bound that it is beyond. One that is negative and cannot be is left as it is: a fit passes
+        through there, and one that ends there found nothing at work."""
+        return min(amplitude if self.positive else max(amplitude, self.lowest), self.highest)
 
     def unit_changes(self, scene: Scene, shapes: Sequence[Shape]) -> FloatArray:
         """The changes [P, m] Nm of a small amplitude, per unit: the columns that a linear screen works with."""

@@ -80,12 +80,13 @@ class FittedEffect:
 
     @property
     def free(self) -> NDArray[np.bool_]:
-        """Which of (amplitude, smooth shapes) [1 + s] a refit may move: shapes at a bound stay there."""
+        """Which of (amplitude, smooth shapes) [1 + s] a refit may move: what is at a bound stays there."""
         margins = [
             min(value - shape.lowest, shape.highest - value) / (shape.highest - shape.lowest)
             for value, shape in self.effect.smooth(self.shape)
         ]
-        return np.array([True, *(margin > 0.01 for margin in margins)])  # fits stop exactly there
+        inside = self.amplitude < self.effect.highest and (self.effect.positive or self.amplitude > self.effect.lowest)
+        return np.array([inside, *(margin > 0.01 for margin in margins)])  # fits stop exactly there
 
     def discrepancy_columns(self, design: Design, prediction: Prediction) -> FloatArray:
         """∂torque/∂b [N, m] Nm."""

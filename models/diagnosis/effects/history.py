@@ -54,6 +54,8 @@ RUNNING_IN = Effect(
     states_below="The new clutch's friction was {} below its settled value.",
     unit="%",
     prior_sd=0.08,
+    lowest=-1.0,
+    highest=1.0,
     scale=100.0,
     shapes=(
         ShapeParameter(name="log of the length ζ_r", unit="ln cycles", lowest=3.0, highest=8.6, smooth=True),
@@ -68,6 +70,8 @@ RUNNING_IN = Effect(
 
 #: Log prior odds [nats] of an unlogged change against a logged one.
 _UNLOGGED = -2.0
+#: The largest step of viscous friction upwards [-]. Derived: from ISO VG 22 to VG 100, the grades of such gears.
+_THICKEST = 4.0
 
 
 def _oil_change_grid(facts: Facts) -> tuple[Tried, ...]:
@@ -102,6 +106,8 @@ OIL_CHANGE = Effect(
     states_below="Viscous friction stepped down by {}.",
     unit="%",
     prior_sd=0.15,
+    lowest=-1.0,
+    highest=_THICKEST,
     scale=100.0,
     shapes=(
         ShapeParameter(name="cycle ζ_k", unit="cycles"),
@@ -142,7 +148,8 @@ ACCELERATED_WEAR = Effect(
     states="Static torque lost {} more by the last state.",
     unit="%",
     prior_sd=0.1,
-    positive=True,
+    lowest=0.0,
+    highest=1.0,
     scale=100.0,
     shapes=(
         ShapeParameter(name="onset ζ_k", unit="cycles"),
@@ -188,7 +195,7 @@ LOAD_SEVERITY = Effect(
     felt=Felt(unit="", of=of_twice),
     states="Doubling the energy per engagement multiplies ageing by {}.",
     prior_sd=0.7,
-    positive=True,
+    lowest=0.0,
     grid=_load_severity_grid,
     change=lambda scene, amplitude, _: (
         scene.curve_at(cycles=effective_cycles(scene.points.cycles, scene.facts, amplitude)) - scene.curve_at()
@@ -246,6 +253,8 @@ REST_RECOVERY = Effect(
     states_below="Friction was {} lower right after the longest rest.",
     unit="%",
     prior_sd=0.04,
+    lowest=-1.0,
+    highest=1.0,
     scale=100.0,
     shapes=(
         ShapeParameter(name="length ζ_c", unit="cycles"),

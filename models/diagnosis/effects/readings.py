@@ -24,6 +24,7 @@ from models.diagnosis.effects.effect import (
     Tried,
     by_loop,
     flattening,
+    within,
 )
 from models.relaxation import recursion
 
@@ -100,6 +101,7 @@ TORQUE_ZERO_SHIFT = Effect(
     article="a",
     physics="Even unloaded, the sensor shows a torque; it adds this at every speed and pressure.",
     check="read the torque with the shaft unloaded, before and after a test",
+    repair="zero the torque sensor before each test",
     formula="a · step(ζ > ζ_k), a · t/30 min, a (1 - e^{-t/τ}), or a · (ζ/ζ_last)^q or the same in days, with the sensor's "
     "sign",
     source="strain-gauge transducers: ISO 376, zero drift and creep",
@@ -179,6 +181,7 @@ PRESSURE_OFFSET = Effect(
     article="a",
     physics="The gauge does not read the pressure that presses the plates.",
     check="compare the pressure reading with a second gauge at the piston",
+    repair="repair the gauge",
     formula="S(p + a) - S(p), a constant, growing as (ζ/ζ_last)^q or towards an end, or from a cycle on",
     source="Ompusunggu et al. 2013, fig. 1: one gauge in the line, none at the piston",
     kind=Kind.ARTEFACT,
@@ -188,6 +191,7 @@ PRESSURE_OFFSET = Effect(
     unit="bar",
     prior_sd=0.15e5,
     scale=1e-5,
+    between=lambda facts: within(facts.lowest_pressure),
     shapes=(
         ShapeParameter(name="course", unit="-"),
         ShapeParameter(name="onset or s", unit="cycles or -"),
@@ -236,6 +240,7 @@ UNSETTLED_DWELL = Effect(
     article="an",
     physics="Friction settles after a step; a reading taken too early still contains a share of the previous plateau.",
     check="hold each speed twice as long before it is read: the error must go",
+    repair="hold each speed longer before it is read",
     formula="a (x_before - S), x = S + k a (x_before - S) what a plateau ends with; a = e^{-dwell/τ} averaged over what was "
     "read",
     source="Ompusunggu et al. 2013, section 2.3.3: 5 s a plateau; real transients in tests/real",
@@ -244,7 +249,8 @@ UNSETTLED_DWELL = Effect(
     states="A reading still contains {} of the previous plateau.",
     unit="%",
     prior_sd=0.05,
-    positive=True,
+    lowest=0.0,
+    highest=1.0,
     scale=100.0,
     shapes=(
         ShapeParameter(name="what a plateau starts from", unit="-"),
@@ -297,6 +303,7 @@ CHANNEL_DELAY = Effect(
     unit="ms",
     prior_sd=0.08,
     scale=1000.0,
+    between=lambda facts: within(facts.shortest_period),
     change=_channel_delay_change,
     before_lag=True,
     opposite_physics="Torque is ahead of the speed: a filter or the recorder delays the speed channel.",

@@ -19,6 +19,7 @@ import numpy as np
 from scipy.constants import zero_Celsius
 
 from models.arrays import FloatArray
+from models.diagnosis import criteria
 from models.diagnosis.baseline.laws import Scene
 from models.diagnosis.campaign import Oil
 from models.diagnosis.design.facts import Facts
@@ -92,6 +93,7 @@ OIL_TEMPERATURE = Effect(
     article="changed",
     physics="Oil temperature differed between tests or within them; warm oil is thinner and shears more easily.",
     check="compare the oil's temperature between tests; hold it constant, or record it with each run",
+    repair="hold the oil's temperature, or record it with each run",
     formula="C_v |v|^γ ((ν(T)/ν_ref)^β - 1), and V_S (ν(T)/ν_ref)^{κβ} for V_S, ν by ASTM D341 at a film's "
     "temperature, which follows the oil's within τ; κ = -1/γ with β = γ is Hersey's similarity",
     source="ASTM D341-20; M. D. Hersey, J. Wash. Acad. Sci. 4 (1914) 542; Ompusunggu et al. 2013, section 2.3 (80 to 90 °C)",
@@ -102,7 +104,7 @@ OIL_TEMPERATURE = Effect(
     felt=Felt(unit="%", of=lambda β: 100.0 * (1.0 - of_twice(-β))),
     states="Halving the oil's viscosity costs {} of the viscous torque.",
     prior_sd=0.7,
-    positive=True,
+    lowest=0.0,
     shapes=(
         ShapeParameter(name="share of V_S κ", unit="-", lowest=-5.0, highest=2.0, smooth=True),
         ShapeParameter(
@@ -120,6 +122,8 @@ OIL_TEMPERATURE = Effect(
 REFERENCE_FLUX = 0.32e6
 #: What weakens: all of the friction or the oil's shear, and friction lags behind that; or so much of the torque at once.
 WHOLE, VISCOUS, WHOLE_AT_ONCE, VISCOUS_AT_ONCE = 0.0, 1.0, -1.0, -2.0
+#: The largest loss at the reference's flux [-]: something is left of friction.
+_MOST_LOST = 0.95
 #: The most that a measured rise counts for, of that at the reference's flux: a faulty thermometer must not overflow.
 _MOST_WARMTH = 30.0
 
@@ -139,7 +143,7 @@ def _interface_heating_change(scene: Scene, amplitude: float, shape: Shape) -> F
     log_settling, part, saturation = shape
     warmth = _measured(scene, _computed(scene, float(np.exp(log_settling)), saturation))
     carried = scene.curve if part in {WHOLE, WHOLE_AT_ONCE} else scene.viscous
-    return np.asarray(-carried * -np.expm1(-amplitude * warmth), dtype=np.float64)
+    return np.asarray(carried * np.expm1(np.log1p(-min(amplitude, _MOST_LOST)) * warmth), dtype=np.float64)
 
 
 def _measured(scene: Scene, computed: FloatArray) -> FloatArray:
@@ -171,7 +175,8 @@ INTERFACE_HEATING = Effect(
     physics="Frictional power heats the interface above the oil's temperature; the boundary film and the oil there lose "
     "strength.",
     check="measure the plate's temperature, or shorten the plateaus of high power",
-    formula="-S (1 - e^{-a w}), w the heat flux |S| ω/A over 0.32 W/mm², saturating by s and lagging by τ; S or its "
+    repair="let the plates cool between readings",
+    formula="-S (1 - (1 - a)^w), w the heat flux |S| ω/A over 0.32 W/mm², saturating by s and lagging by τ; S or its "
     "viscous part; where the plate's temperature was measured w is its rise above the oil over that at 0.32 W/mm²",
     source="Marklund and Larsson, Tribology Int. 41 (2008) 824: friction of wet clutches by interface temperature",
     kind=Kind.ARTEFACT,
@@ -179,7 +184,8 @@ INTERFACE_HEATING = Effect(
     states="Friction loses {} at 0.32 W/mm².",
     unit="%",
     prior_sd=0.1,
-    positive=True,
+    lowest=0.0,
+    highest=_MOST_LOST,
     scale=100.0,
     shapes=(
         ShapeParameter(name="log of the settling time τ", unit="ln s", lowest=-5.0, highest=6.0, smooth=True),
@@ -253,7 +259,8 @@ HYDRODYNAMIC_DRAG = Effect(
     states="The drag is {} at the middle speed.",
     unit="Nm",
     prior_sd=0.5,
-    positive=True,
+    lowest=0.0,
+    highest=0.5 * criteria.USUAL_TORQUE,
     shapes=(
         ShapeParameter(name="power m", unit="-", lowest=0.5, highest=1.8, smooth=True),
         ShapeParameter(name="rupture of the film r", unit="-"),

@@ -113,12 +113,14 @@ def _along_amplitude(
     middle = (score[0] - np.array([(sloped * fixed / (1 + values)).sum(), 0.0])) / left
     low, high = middle - _REACH * left**-0.5, middle + _REACH * left**-0.5
     steps = np.unique([*np.linspace(low.min(), high.max(), _WIDE), *np.linspace(low[1], high[1], _NEAR)])
-    if fitted.effect.positive:
-        least = -fitted.amplitude
-        falls = left * (least - middle)  # how fast both densities fall off from none, where the data ask for less
-        ends = _REACH / np.maximum(falls, np.sqrt(left)) * np.linspace(0.0, 1.0, _NEAR)[1:, None]
-        beyond = (least + ends[:, falls > 0.0]).ravel()
-        steps = np.unique([least, *steps[steps > least], *beyond])
+    least, most = fitted.effect.lowest - fitted.amplitude, fitted.effect.highest - fitted.amplitude
+    for bound, inwards in ((least, 1.0), (most, -1.0)):
+        if np.isfinite(bound):
+            # how fast both densities fall off inwards, where the data ask for what is beyond
+            falls = inwards * left * (bound - middle)
+            ends = inwards * _REACH / np.maximum(falls, np.sqrt(left)) * np.linspace(0.0, 1.0, _NEAR)[1:, None]
+            steps = np.concatenate([steps, [bound], (bound + ends[:, falls > 0.0]).ravel()])
+    steps = np.unique(steps[(steps >= least) & (steps <= most)])
     squared = np.square(1.0 + steps / fitted.amplitude)[:, None]
     gain = squared * np.square(fixed - sloped * steps[:, None]) / (1 + squared * values) - np.log1p(values)
     logs = score[0] * steps - 0.5 * info[0, 0] * np.square(steps) + 0.5 * gain.sum(axis=1)

@@ -150,18 +150,21 @@ def _likeliest(projected: Projected, mine: FloatArray) -> FloatArray:
 
 
 def _log_prior(fitted: Fit) -> float:
-    """The normalisation of the priors of the effects' amplitudes and smooth shapes [nats]."""
+    """The normalisation of the priors of the effects' amplitudes and smooth shapes [nats]. An amplitude of one sign has all
+    of its prior there; one at its bound has one side of it, which `_beside_bounds` counts twice."""
     logs = [e.effect.log_amplitude_peak + 0.5 * float(np.log(e.precisions[1:]).sum()) for e in fitted.effects]
-    return sum(logs) + float(np.log(2.0)) * sum(e.effect.positive for e in fitted.effects)
+    halves = sum(int(e.effect.positive) - int(not e.free[0]) for e in fitted.effects)
+    return sum(logs) + float(np.log(2.0)) * halves
 
 
 def _held_at_bounds(gram: Gram, first: int, fitted: Fit) -> tuple[Gram, FloatArray]:
-    """The Gram matrix with shapes at a bound before the changes [h], and which way is out for each [h] ±1; the effects'
+    """The Gram matrix with what is at a bound before the changes [h], and which way is out for each [h] ±1; the effects'
     columns begin at `first`."""
     ways: list[float] = []  # 0 for what is free
     for effect in fitted.effects:
         smooth = effect.effect.smooth(effect.shape)
-        out = np.array([1.0, *(1.0 if 2 * x > shape.lowest + shape.highest else -1.0 for x, shape in smooth)])
+        amplitude_out = 1.0 if effect.amplitude >= effect.effect.highest else -1.0
+        out = np.array([amplitude_out, *(1.0 if 2 * x > shape.lowest + shape.highest else -1.0 for x, shape in smooth)])
         ways += np.where(effect.free, 0.0, out).tolist()
     outward = np.array(ways)
     at_bound = gram.laws + first + np.flatnonzero(outward)
@@ -176,7 +179,7 @@ def _held_at_bounds(gram: Gram, first: int, fitted: Fit) -> tuple[Gram, FloatArr
 
 
 def _beside_bounds(projected: Projected, held: slice, outward: FloatArray) -> float:
-    """What the shapes at a bound add [nats]: all of their prior lies on one side, and where the data ask for values beyond,
+    """What lies at a bound adds [nats]: all of its prior lies on one side, and where the data ask for values beyond,
     it falls off there (twice the half of a normal one that it would be where they do not)."""
     info = np.maximum(np.diag(projected.info)[held], 1e-300)
     slope = np.maximum(outward * projected.score[held], 0.0) / np.sqrt(2 * info)

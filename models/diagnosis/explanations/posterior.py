@@ -90,7 +90,7 @@ def starts(columns: Sequence[Column], screened: Sequence[Projected]) -> dict[str
         screen = screen_of(screened[likely])
         amplitude = float(screen.score[best] / (screen.info[best] + (SCALES[-1] * sd[best]) ** -2.0))
         column = columns[best]
-        fitted = FittedEffect(effect=column.effect, amplitude=amplitude, shape=column.shape)
+        fitted = FittedEffect(effect=column.effect, amplitude=column.effect.within(amplitude), shape=column.shape)
         promise = log_sum(total[kind_starts]) - null
         by_effect.setdefault(slug, []).append(Start(promise, column, likely, fitted))
     return {slug: sorted(by_kind, key=lambda start: -start.promise) for slug, by_kind in by_effect.items()}

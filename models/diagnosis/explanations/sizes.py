@@ -75,7 +75,7 @@ class _Component:
             drawn.append(
                 FittedEffect(
                     effect=fitted.effect,
-                    amplitude=max(amplitude, 0.0) if fitted.effect.positive else amplitude,
+                    amplitude=float(np.clip(amplitude, fitted.effect.lowest, fitted.effect.highest)),
                     shape=tuple(shape),
                     factors=tuple(off[after : after + last.size].tolist()),
                 )
@@ -110,7 +110,8 @@ def sizes_of(problem: FitProblem, judgement: Judgement, rng: np.random.Generator
             effects = component.effects(off)
             for effect, size in zip(effects, component.sizes(effects), strict=True):
                 form = float(np.exp(criteria.SIZE_FORM * rng.standard_normal()))
-                sized.setdefault(effect.effect.slug, []).append(size * form)
+                possible = float(np.clip(size * form, effect.effect.lowest, effect.effect.highest))
+                sized.setdefault(effect.effect.slug, []).append(possible)
             named = tuple(effect for effect in effects if effect.effect.slug in judgement.causes)
             samples.append((trend, index, named))
     samples += [(0.0, 0, ())] * (criteria.SIZES_SAMPLED - len(samples))  # nothing at work

@@ -96,13 +96,15 @@ def fit(problem: FitProblem, start: Laws, effects: Sequence[FittedEffect] = (), 
 
 
 def _inside(state: Fit, priors: Priors, matrix: FloatArray, gradient: FloatArray) -> FloatArray:
-    """The step [m] that matrix · step = gradient asks for; shapes at a bound beyond which it would lead are held there."""
+    """The step [m] that matrix · step = gradient asks for; what is at a bound beyond which it would lead is held there."""
     step = np.asarray(np.linalg.solve(matrix, gradient), dtype=np.float64)
     at, at_bound = int(priors.free.sum()), np.zeros(step.size, dtype=np.bool_)
     for fitted in state.effects:
-        at += 1
-        for value, shape in fitted.effect.smooth(fitted.shape):
-            at_bound[at] = (value <= shape.lowest and step[at] < 0) or (value >= shape.highest and step[at] > 0)
+        effect = fitted.effect
+        ends = [(-math.inf if effect.positive else effect.lowest, fitted.amplitude, effect.highest)]
+        ends += [(shape.lowest, value, shape.highest) for value, shape in effect.smooth(fitted.shape)]
+        for lowest, value, highest in ends:
+            at_bound[at] = (value <= lowest and step[at] < 0) or (value >= highest and step[at] > 0)
             at += 1
     if at_bound.any():
         step[at_bound] = 0.0
@@ -184,7 +186,7 @@ def _moved(state: Fit, priors: Priors, step: FloatArray) -> tuple[Laws, tuple[Fi
     courses[:] = np.clip(courses, -3.0, 25.0)
     at, effects = count, []
     for fitted in state.effects:
-        size = fitted.amplitude + float(step[at])
+        size = fitted.effect.within(fitted.amplitude + float(step[at]))
         at += 1
         shape = list(fitted.shape)
         for index in fitted.smooth_places:
@@ -221,7 +223,7 @@ def _starts(
     yield upright, effects
     if effects:
         *others, last = effects
-        large = math.copysign(SCALES[-1] * last.effect.prior_sd, last.amplitude)
+        large = last.effect.within(math.copysign(SCALES[-1] * last.effect.prior_sd, last.amplitude))
         for tried in last.effect.grid(design.facts):
             if last.effect.stiff(tried.shape) == last.effect.stiff(last.shape):
                 yield upright, (*others, replace(last, amplitude=large, shape=tried.shape))
