@@ -13,11 +13,14 @@ import numpy as np
 
 from models.arrays import FloatArray
 from models.diagnosis import criteria
-from models.diagnosis.baseline.law_form import LawForm, LawSizes
-from models.diagnosis.baseline.laws import Laws
+from models.diagnosis.baseline.law_form import MARGIN, LawForm, LawSizes
+from models.diagnosis.baseline.laws import STRIBECK_VELOCITY, Laws
 from models.diagnosis.baseline.prediction import predict
 from models.diagnosis.design.design import Design
 
+#: Places of pressure and of √life at which V_S is taken, and the most that it moves the law's form along ln v [-]: where a
+#: curve shows no fall, V_S is anything.
+_NODES, _MOST_MOVED = np.linspace(0.0, 1.0, 41), 1.0
 #: Speeds below this share of the highest count as it [-].
 _LEAST_SPEED = 1e-3
 
@@ -36,21 +39,38 @@ class LawDiscrepancy:
         return prediction.change_at_rows(design, prediction.scene.curve[:, None] * shares, before_lag=True)
 
 
-def law_discrepancy(design: Design, laws: Laws) -> LawDiscrepancy:
-    """The discrepancy of the laws that fit a design."""
+def law_discrepancy(design: Design, laws: Laws, *, moving: bool) -> LawDiscrepancy:
+    """The discrepancy of the laws that fit a design; `moving`: along the speed as V_S does over pressure and life."""
     velocity = design.rows.velocity[design.closed & design.rows.steady]
-    fastest = float(velocity.max())
+    first, last = float(design.facts.states[0]), float(design.facts.states[-1])
+    by_pressure, by_life = _moved(laws, first, last) if moving else (np.zeros(1), np.zeros(1))
+    fastest = float(velocity.max() * np.exp(-by_pressure.min() - by_life.min()))
+    slowest = float(velocity.min() * np.exp(-by_pressure.max() - by_life.max()))
     form = LawForm(
-        slowest=max(float(velocity.min()), _LEAST_SPEED * fastest),
+        slowest=max(slowest, _LEAST_SPEED * fastest),
         fastest=fastest,
         lowest=laws.frame.lowest,
         highest=laws.frame.highest,
-        first=float(design.facts.states[0]),
-        last=float(design.facts.states[-1]),
+        first=first,
+        last=last,
         pressures=design.levels.size,
         states=design.facts.states.size,
+        moved_by_pressure=tuple(by_pressure.tolist()),
+        moved_by_life=tuple(by_life.tolist()),
     )
     return LawDiscrepancy(form, laws)
+
+
+def _moved(laws: Laws, first: float, last: float) -> tuple[FloatArray, FloatArray]:
+    """ln V_S [NODES] over the places of pressure at the first state, and over those of √life at the middle pressure, less
+    that of both; each within MOST_MOVED."""
+    lowest, highest = laws.frame.lowest, laws.frame.highest
+    pressures = lowest + (highest - lowest) * np.clip(_NODES * (1.0 + 2.0 * MARGIN) - MARGIN, 0.0, 1.0)
+    cycles, middle = first + (last - first) * _NODES**2, np.full(_NODES.size, 0.5 * (lowest + highest))
+    over = (pressures, np.full(_NODES.size, first)), (middle, cycles)
+    by_pressure, by_life = (np.log(laws.parameters(*places)[:, STRIBECK_VELOCITY]) for places in over)
+    usual = by_life[0]
+    return np.clip(by_pressure - usual, -_MOST_MOVED, _MOST_MOVED), np.clip(by_life - usual, -_MOST_MOVED, _MOST_MOVED)
 
 
 def sizes_considered() -> list[tuple[LawSizes, float]]:

@@ -1,12 +1,13 @@
 """How a friction law may differ from eq. 3: smooth functions over speed, pressure and life, as a sum of cosines.
 
-    δ(v, p, ζ) = h(x) + q(p) h'(x) + z h''(x) + f(p) + g(z),     x = ln v,  z = √(share of the life)
+    δ(v, p, ζ) = h(x) + q(p) h'(x) + z h''(x) + f(p) + g(z),     x = ln v or ln v/V_S(p, ζ),  z = √(share of the life)
 
     h(x) = (v_max/v)^0.2 Σ_k c_k √2 cos(kπ u),   u = (x - x_min)/(x_max - x_min),   c_k ~ N(0, τ_h² w_k),
     w_k ∝ e^{-½ (kπ ℓ/(x_max - x_min))²},   Σ w_k = 1
 
 the covariance of the coefficients being that of a squared-exponential process of length ℓ. So τ_h is the relative rms of the
-form at the highest speed. Beyond what was measured the value at the end is kept.
+form at the highest speed. Where the fall e^{-V_S/v} has another form, that moves along the speed as V_S does over pressure
+and life; where so many rpm have another torque, it does not. Beyond what was measured the value at the end is kept.
 
 Source: M. C. Kennedy and A. O'Hagan, Bayesian calibration of computer models, J. R. Stat. Soc. B 63 (2001) 425-464; lengths
 and the envelope are those of measured friction curves (docs/appendix/diagnosis.md).
@@ -30,12 +31,12 @@ _CHANGING_PRESSURES = 2
 _LENGTH, _LAW_LENGTH = 0.4, 0.2
 #: The waves over pressure reach so far beyond the range of pressures, a share of it: within it they may have any slope at
 #: its ends, which an offset of the pressure shows.
-_MARGIN = 0.25
+MARGIN = 0.25
 #: (v_max/v) to this power: what measured curves do otherwise is 1.5 to 4 times as large at the lowest speeds.
 _ENVELOPE = 0.2
-#: How far the form over speed changes with pressure and with life, shares of the form: measured curves' misfits at the
-#: lowest and the highest pressure correlate by .63 to 1; what changes over life is eq. 6's part of each parameter.
-_CHANGES, _CHANGES_OVER_LIFE = 0.5, 0.1
+#: How far the form over speed changes with pressure and with life, a share of the form: measured curves' misfits at the
+#: lowest and the highest pressure correlate by .63 to 1.
+_CHANGES = 0.5
 
 
 #: Nodes of tables along ln v, pressure and √life.
@@ -58,7 +59,7 @@ EXACT = LawSizes(0.0, 0.0, 0.0)
 class LawForm:
     """The functions of which δ is a sum, on the ranges that a campaign measured."""
 
-    slowest: float  # [m/s]
+    slowest: float  # [m/s], as the next at the V_S of the middle pressure and the first state
     fastest: float
     lowest: float  # [Pa]
     highest: float
@@ -66,6 +67,10 @@ class LawForm:
     last: float
     pressures: int  # distinct ones
     states: int
+    # ln of the Stribeck velocity with which the form moves along the speed, over that of the middle pressure at the first
+    # state: at nodes over the places of pressure, and over those of √life
+    moved_by_pressure: tuple[float, ...] = (0.0,)
+    moved_by_life: tuple[float, ...] = (0.0,)
 
     def deviations(self, sizes: LawSizes) -> FloatArray:
         """The prior deviations [k] of the coefficients [-]."""
@@ -100,10 +105,12 @@ class LawForm:
         self, velocity: FloatArray, pressure: FloatArray, cycles: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Places [n] within 0 ... 1 along ln v, pressure and √life."""
-        speed = np.log(np.clip(velocity, self.slowest, self.fastest) / self.slowest) / self._width
         high = (pressure - self.lowest) / max(self.highest - self.lowest, 1e-300)
-        high = np.clip((high + _MARGIN) / (1.0 + 2.0 * _MARGIN), 0.0, 1.0)
+        high = np.clip((high + MARGIN) / (1.0 + 2.0 * MARGIN), 0.0, 1.0)
         gone = np.sqrt(np.clip((cycles - self.first) / max(self.last - self.first, 1.0), 0.0, 1.0))
+        moved = _at(high, self.moved_by_pressure) + _at(gone, self.moved_by_life)
+        moving = np.clip(velocity * np.exp(-moved), self.slowest, self.fastest)
+        speed = np.log(moving / self.slowest) / self._width
         return speed, high, gone
 
     def _form(self, speed: FloatArray) -> FloatArray:
@@ -153,6 +160,11 @@ class LearnedLaw:
     def share(self, velocity: FloatArray, pressure: FloatArray, cycles: FloatArray) -> FloatArray:
         """δ [n] at velocity [n] m/s, pressure [n] Pa and cycles [n]."""
         return self.form.share(self.coefficients, velocity, pressure, cycles)
+
+
+def _at(unit: FloatArray, nodes: tuple[float, ...]) -> FloatArray:
+    """What even nodes over 0 ... 1 have there [n]."""
+    return np.interp(unit, np.linspace(0.0, 1.0, len(nodes)), nodes)
 
 
 def _waves(unit: FloatArray, orders: int, length: float) -> FloatArray:

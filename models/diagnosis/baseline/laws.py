@@ -47,7 +47,7 @@ ATTRACTOR = DRIFT + 3
 #: the remainder passed for a shifted zero.
 POWERS = 4
 KAPPA, OPEN_DRAG = slice(ATTRACTOR, -POWERS), slice(-POWERS, None)
-RATIO = 1  # the place of M̄_c among the four
+RATIO, STRIBECK_VELOCITY = 1, 2  # the places of M̄_c and V_S among the four
 #: V_S [m/s] is kept above this, lest eq. 3 divides by it.
 _LEAST_VELOCITY = 1e-3
 

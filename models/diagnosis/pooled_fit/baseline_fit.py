@@ -40,6 +40,8 @@ from models.diagnosis.pooled_fit.gauss_newton import STEPS, Fit, FitStatus, fit
 from models.diagnosis.pooled_fit.problem import FitProblem, LawTerms, priors_of
 from models.diagnosis.pooled_fit.projection import (
     GAINS,
+    Gram,
+    Projected,
     gram_of,
     law_torque,
     learned_law,
@@ -211,10 +213,9 @@ def _with_its_noise(problem: FitProblem, fitted: Fit) -> Baseline:
     for turn in range(criteria.MOST_TURNS):
         # twice: the law lags by the C that was fitted beside it; eq. 3 alone may have it wrong by a factor of two
         if turn < 2:
-            discrepancy = law_discrepancy(problem.design, _lagging_as(exact.laws, fitted.laws))
-            problem = replace(problem, law=LawTerms(discrepancy, discrepancy.columns(problem.design)))
+            problem = _with_law(problem, fitted, _lagging_as(exact.laws, fitted.laws))
         gram = gram_of(problem, fitted)
-        noise = max(projections_of(gram, problem.noise, GAINS[::2]), key=lambda one: one.evidence).noise(problem.noise)
+        noise = _likeliest(gram, problem).noise(problem.noise)
         noise = replace(noise, run_gain=problem.noise.run_gain, curve_gain=likely_curve_gain(gram, noise.law))
         problem = problem.with_noise(noise)
         fitted = fit(problem, fitted.laws)
@@ -230,6 +231,18 @@ def _with_its_noise(problem: FitProblem, fitted: Fit) -> Baseline:
     # effects that read the law at another pressure, speed or state read it as it was found
     fitted = fit(problem, replace(fitted.laws, learned=learned_law(problem, fitted)))
     return Baseline(problem=problem, fit=fitted, exact=exact, notes=_notes(problem.design, assumed))
+
+
+def _with_law(problem: FitProblem, fitted: Fit, laws: Laws) -> FitProblem:
+    """The problem with the discrepancy of laws, whose form moves with V_S or does not: the likelier one."""
+    forms = [law_discrepancy(problem.design, laws, moving=moving) for moving in (False, True)]
+    problems = [replace(problem, law=LawTerms(form, form.columns(problem.design))) for form in forms]
+    return max(problems, key=lambda one: _likeliest(gram_of(one, fitted), one).evidence)
+
+
+def _likeliest(gram: Gram, problem: FitProblem) -> Projected:
+    """Of every second scatter of the gains and all sizes of the law."""
+    return max(projections_of(gram, problem.noise, GAINS[::2]), key=lambda one: one.evidence)
 
 
 def _lagging_as(laws: Laws, other: Laws) -> Laws:
