@@ -5,6 +5,9 @@ torque is taken off every plateau before a curve is fitted. A *course* (running-
 the clutch and not in eq. 6: its mean torque is taken off the measured course before eq. 6 is tracked, and put back when
 the threshold's first passage is looked for.
 
+The *law* is friction itself, S (1 + δ) in place of eq. 3's S (`baseline.law_form`): a curve is fitted to torque/(1 + δ),
+and its mean torque is that of S (1 + δ).
+
 What the diagnosis does not know is a weighted set of draws (`effects.fitted_effect`), each one coherent correction of all
 runs of a life: a life is tracked under each, and the prognosis is their mixture.
 """
@@ -18,6 +21,7 @@ import numpy as np
 
 from models.arrays import FloatArray
 from models.clutch import Geometry
+from models.diagnosis.baseline.law_form import LawForm, LearnedLaw
 from models.diagnosis.baseline.laws import Frame, Laws, scene_of
 from models.diagnosis.campaign import Campaign, Oil, StationaryRun
 from models.diagnosis.design.design import Points, build_design, points_of
@@ -26,6 +30,8 @@ from models.diagnosis.effects.catalogue import BY_SLUG
 from models.diagnosis.effects.effect import Discrepancy, Kind
 from models.diagnosis.effects.fitted_effect import Draw, FittedEffect, Ranges
 
+#: How answers name the law as found where it is in force in place of eq. 3; no effect of the catalogue.
+FRICTION_LAW = "friction_law"
 #: Plateaus are handed on in parts of this many: a design takes no more of one run.
 _PART = 2000
 
@@ -64,6 +70,12 @@ class Extension:
                 points = build_design(replace(campaign, stationary=(part,), dynamic=())).points
                 torque[:, rows] = points.sign * self._changes(points, self._facts(campaign), Kind.ARTEFACT)
         return torque
+
+    @property
+    def law(self) -> LearnedLaw | None:
+        """How friction differs from eq. 3; None where eq. 3 stays."""
+        stored = self.content["law"]
+        return None if stored is None else _learned_from(stored)
 
     @property
     def has_course(self) -> bool:
@@ -128,8 +140,11 @@ class Extension:
         return cls(effects=tuple(stored["effects"]), content=stored["content"])
 
 
-def build_extension(draws: Sequence[Draw], facts: Facts, ranges: Ranges, *, courses: bool) -> Extension:
-    """An extension from weighted draws, and the campaign's facts and ranges that they refer to.
+def build_extension(
+    draws: Sequence[Draw], facts: Facts, ranges: Ranges, *, courses: bool, law: LearnedLaw | None = None
+) -> Extension:
+    """An extension from weighted draws, and the campaign's facts and ranges that they refer to; and the law in place of
+    eq. 3.
 
     `courses`: whether effects of use are to be followed beyond the data; where they did not help to predict the last states
     from the first, a life is tracked without them. ζ counts by the mean exponent of severity.
@@ -142,11 +157,19 @@ def build_extension(draws: Sequence[Draw], facts: Facts, ranges: Ranges, *, cour
     total = sum(weight for weight, _ in exponents)
     exponent = sum(weight * amplitude for weight, amplitude in exponents) / total if total > 0 else None
     return Extension(
-        effects=tuple(effects),
+        effects=(*effects, *((FRICTION_LAW,) if law is not None else ())),
         content={
             "facts": facts_to(facts),
             "ranges": {along.value: list(range_) for along, range_ in ranges.items()},
-            "laws": [{"theta": shared.theta.tolist(), "frame": facts_to(shared.frame)} for shared in laws],
+            "law": None if law is None else _learned_to(law),
+            "laws": [
+                {
+                    "theta": shared.theta.tolist(),
+                    "frame": facts_to(shared.frame),
+                    "learned": None if shared.learned is None else _learned_to(shared.learned),
+                }
+                for shared in laws
+            ],
             "draws": [
                 {
                     "weight": draw.weight,
@@ -169,8 +192,8 @@ def build_extension(draws: Sequence[Draw], facts: Facts, ranges: Ranges, *, cour
     )
 
 
-def facts_to(facts: Facts | Frame) -> dict[str, Any]:
-    """Facts, or a frame, as JSON can carry them: arrays as lists, what is not a number as None."""
+def facts_to(facts: Facts | Frame | LawForm) -> dict[str, Any]:
+    """Facts, a frame, or the form of a law, as JSON can carry them: arrays as lists, what is not a number as None."""
     stored = asdict(facts)
     for name, value in stored.items():
         if isinstance(value, np.ndarray | tuple):
@@ -185,7 +208,7 @@ def facts_from(stored: Mapping[str, Any]) -> Facts:
     )
 
 
-def _arrays_of(kind: type[Facts | Frame], stored: Mapping[str, Any]) -> dict[str, Any]:
+def _arrays_of(kind: type[Facts | Frame | LawForm], stored: Mapping[str, Any]) -> dict[str, Any]:
     """What is stored with its lists as the arrays, or tuples, that they were."""
     values = dict(stored)
     for field in fields(kind):
@@ -196,5 +219,18 @@ def _arrays_of(kind: type[Facts | Frame], stored: Mapping[str, Any]) -> dict[str
 
 
 def _laws(stored: Mapping[str, Any]) -> Laws:
-    frame = Frame(**_arrays_of(Frame, stored["frame"]))
-    return Laws(theta=np.array(stored["theta"], dtype=np.float64), frame=frame)
+    frame, learned = Frame(**_arrays_of(Frame, stored["frame"])), stored["learned"]
+    return Laws(
+        theta=np.array(stored["theta"], dtype=np.float64),
+        frame=frame,
+        learned=None if learned is None else _learned_from(learned),
+    )
+
+
+def _learned_to(learned: LearnedLaw) -> dict[str, Any]:
+    return {"form": facts_to(learned.form), "coefficients": learned.coefficients.tolist()}
+
+
+def _learned_from(stored: Mapping[str, Any]) -> LearnedLaw:
+    form = LawForm(**_arrays_of(LawForm, stored["form"]))
+    return LearnedLaw(form=form, coefficients=np.array(stored["coefficients"], dtype=np.float64))

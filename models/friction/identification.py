@@ -296,13 +296,16 @@ def fit_curves(curves: Sequence[Curve], at_once: int = 20_000) -> tuple[Stribeck
     return tuple(fits)
 
 
-def mean_torques(fits: Sequence[StribeckFit], velocities: FloatArray) -> FloatArray:
-    """Means of the fitted curves over velocities [m] m/s, and their standard deviations by the delta method [Nm]; [n, 2]."""
+def mean_torques(fits: Sequence[StribeckFit], velocities: FloatArray, raised: FloatArray | float = 1.0) -> FloatArray:
+    """Means of the fitted curves over velocities [m] m/s, and their standard deviations by the delta method [Nm]; [n, 2].
+    `raised` [n, m] is what friction is there of eq. 3 [-]."""
     stacked = np.stack([fit.parameters.as_array() for fit in fits], axis=1)[:, :, None]
     parameters = StribeckParameters.from_array(stacked)
-    direction = gradient(velocities, parameters).mean(axis=1)
+    factor = np.broadcast_to(raised, (len(fits), velocities.size))
+    direction = (gradient(velocities, parameters) * factor[..., None]).mean(axis=1)
     variance = np.einsum("ni,nij,nj->n", direction, np.stack([fit.covariance for fit in fits]), direction)
-    return np.stack([torque(velocities, parameters).mean(axis=1), np.sqrt(np.maximum(variance, 0.0))], axis=1)
+    means = (torque(velocities, parameters) * factor).mean(axis=1)
+    return np.stack([means, np.sqrt(np.maximum(variance, 0.0))], axis=1)
 
 
 def _fold(curve: Curve) -> _Folded:

@@ -154,6 +154,10 @@ class FrictionLawOut(base.Answer):
     gain: LawGainOut | None = Field(
         description="What it gains on held-out runs; null if eq. 3 is exact or none can be left out"
     )
+    adoptable: bool = Field(
+        description="Whether the law as found is proposed in place of eq. 3: it predicts held-out runs better, and what is "
+        "at work is known"
+    )
 
 
 class LawCurveOut(base.Answer):

@@ -21,17 +21,16 @@ from service.client.clutchlife.client import diagnosed
 from service.client.clutchlife.transport import Service
 
 _Cells = list[list[float | None]]
+#: A verdict as the page has it, and its colour.
 _VERDICTS = {
-    "model_adequate": ("The model is adequate", "green"),
-    "cause_named": ("The cause is named", "yellow"),
-    "cause_ambiguous": ("The cause cannot be distinguished", "yellow"),
-    "unexplained_structure": ("A pattern that no effect of the catalogue explains", "red"),
+    "model_adequate": ("Model adequate", "green"),
+    "cause_named": ("Cause named", "yellow"),
+    "cause_ambiguous": ("Cause ambiguous", "yellow"),
+    "unexplained_structure": ("Unexplained structure", "red"),
     "insufficient_data": ("Too little data", "cyan"),
 }
 #: An axis is named where chance alone makes such a pattern less often than this.
 _SHOWN_P = 0.01
-#: Probability from which a cause is certain though others are open (that of what a diagnosis names).
-_CERTAIN = 0.9
 #: Candidates that are less probable, or come after this many, are shown by `--json` only. Chosen: a screenful.
 _MIN_PROBABILITY, _MAX_CANDIDATES = 0.005, 6
 #: A gain in log evidence [nats] from which the evidence has this name. Derived: 2 ln B of 6 and 2 in R. E. Kass, A. E.
@@ -52,11 +51,7 @@ def _spelt(slug: str) -> str:
 def shown(report: Mapping[str, Any]) -> Iterator[RenderableType]:
     """The parts of a finished report, each to be printed."""
     words, colour = _VERDICTS[report["verdict"]]
-    named = report["causes"]
-    likely = {item["effect"] for item in report["candidates"] if (item["probability"] or 0.0) >= _CERTAIN}
-    if report["verdict"] == "cause_ambiguous" and likely.intersection(named):
-        words, named = "Cause certain, others possible", [cause for cause in named if cause in likely]
-    causes = f": {', '.join(map(_spelt, named))}" if named else ""
+    causes = f": {', '.join(map(_spelt, report['causes']))}" if report["causes"] else ""
     yield Panel(Text(report["summary"]), title=Text(f"{words}{causes}", style=f"bold {colour}"), border_style=colour)
     if report["candidates"]:
         shown_ones = [item for item in report["candidates"] if (item["probability"] or 0.0) >= _MIN_PROBABILITY]

@@ -4,7 +4,7 @@
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -151,13 +151,20 @@ def _analyse_stationary(
     )
 
 
-def mean_cofs(levels: Sequence[LevelFit], velocities: FloatArray, geometry: Geometry) -> dict[float, Value]:
-    """Mean COF over the protocol's velocities [m] m/s and its deviation by pressure [Pa], where a level determines it."""
+def mean_cofs(
+    levels: Sequence[LevelFit],
+    velocities: FloatArray,
+    geometry: Geometry,
+    raised: Callable[[float], FloatArray] | None = None,
+) -> dict[float, Value]:
+    """Mean COF over the protocol's velocities [m] m/s and its deviation by pressure [Pa], where a level determines it.
+    `raised` gives at a pressure [Pa] what friction is there of eq. 3 [m]."""
     usable = [level for level in levels if level.speeds >= FEWEST_SPEEDS]
     if not usable:
         return {}
     per_cof = np.array([geometry.torque_per_cof(level.mean_pressure) for level in usable])
-    values = (mean_torques([level.fit for level in usable], velocities) / per_cof[:, None]).tolist()
+    factor = 1.0 if raised is None else np.stack([raised(level.mean_pressure) for level in usable])
+    values = (mean_torques([level.fit for level in usable], velocities, factor) / per_cof[:, None]).tolist()
     return {
         level.fit.pressure: (cof, sd)
         for level, (cof, sd) in zip(usable, values, strict=True)

@@ -37,13 +37,14 @@ Course: TypeAlias = Callable[[FloatArray, float], FloatArray]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ModelInForce:
-    """The model as answers name it, the weights of its draws, its course (None: eq. 6 alone), and the exponent of an adopted
-    load severity."""
+    """The model as answers name it, the weights of its draws, its course (None: eq. 6 alone), the exponent of an adopted
+    load severity, and in sentences what it takes off the measurements."""
 
     name: ModelName = BASELINE
     weights: tuple[float, ...] = (1.0,)
     course: Course | None = None
     severity_exponent: float | None = None
+    corrected: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -287,6 +287,8 @@ def _action(name: str, summary: Mapping[str, Any], soon: str, diagnosis: LatestD
     health = summary["current"]["health"]
     if name == NORMAL and health is not None and health < SOON:
         return f"Have a replacement at hand: health {100 * health:.0f} %."
+    if name == NORMAL and summary.get("corrected"):
+        return " ".join(summary["corrected"])
     if name == NORMAL or diagnosis is None:
         return "Nothing to do: carry on testing."
     causes = [_cause_in_words(cause) for cause in diagnosis.causes]

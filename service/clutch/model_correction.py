@@ -23,7 +23,7 @@ from models.prognosis.criteria import HORIZON
 from models.records.runs import Plateaus, loaded
 from service.api.clutch import ClutchIn
 from service.api.life import ModelName
-from service.clutch.analysis import levels_of, mean_cofs
+from service.clutch.analysis import Value, levels_of, mean_cofs
 from service.clutch.assumptions import ALL_PRESSURES, Course, ModelInForce
 from service.clutch.criteria import COURSE_PROBES
 from service.clutch.diagnosis.campaign import CampaignRun, campaign_of, run_of, without_record
@@ -31,6 +31,7 @@ from service.clutch.incoming_run import IncomingRun
 from service.clutch.timeline import STATIONARY, Corrected, Event, Life, reference_velocities
 
 if TYPE_CHECKING:
+    from models.diagnosis.baseline.law_form import LearnedLaw
     from models.diagnosis.extension import Extension
 
 _log = logging.getLogger("clutchlife")
@@ -97,20 +98,48 @@ def corrected_cofs(
     geometry = record.geometry.to_model()
     velocities = reference_velocities(life.speed_range, geometry)
     place = {event.run_id: index for index, event in enumerate(life.events)}
-    corrected: dict[str, Corrected] = {}
+    law, corrected = extension.law, dict[str, Corrected]()
     for test in tests:
         artefact = _artefact(extension, test, campaign_of(record, runs[: place[test.run_id]]))
-        if artefact is None:
+        if artefact is None and law is None:
             continue
+        if artefact is None:
+            artefact = np.zeros((extension.weights.size, test.plateaus.torque.size))
         mean = extension.weights @ artefact
-        freed = loaded(replace(test.plateaus, torque=test.plateaus.torque - mean))
-        cofs = {} if freed is None else mean_cofs(levels_of(freed, geometry), velocities, geometry)
+        cofs = _mean_cofs(
+            replace(test.plateaus, torque=test.plateaus.torque - mean), law, test.cycles, velocities, geometry
+        )
         if cofs:
             off = _mean_cof_changes(mean - artefact, test.plateaus, list(cofs), velocities, geometry)
             corrected[test.run_id] = {
                 level: (value, sd, tuple((value + off[level]).tolist())) for level, (value, sd) in cofs.items()
             }
     return corrected
+
+
+def _mean_cofs(
+    freed: Plateaus, law: LearnedLaw | None, cycles: float, velocities: FloatArray, geometry: Geometry
+) -> dict[float, Value]:
+    """Mean COFs of plateaus freed of artefacts, by pressure [Pa]: of eq. 3's curves, or of the law S (1 + δ) at cycles since
+    new, whose S is fitted to torque/(1 + δ)."""
+
+    def raised(velocity: FloatArray, pressure: FloatArray) -> FloatArray:
+        return (
+            np.ones_like(velocity)
+            if law is None
+            else 1.0 + law.share(velocity, pressure, np.full_like(velocity, cycles))
+        )
+
+    by_eq3 = raised(geometry.sliding_velocity(np.abs(freed.speed)), freed.pressure)
+    under_load = loaded(replace(freed, torque=freed.torque / by_eq3))
+    if under_load is None:
+        return {}
+    return mean_cofs(
+        levels_of(under_load, geometry),
+        velocities,
+        geometry,
+        lambda pressure: raised(velocities, np.full_like(velocities, pressure)),
+    )
 
 
 def _mean_cof_changes(
@@ -147,11 +176,14 @@ def model_in_force(extension: Extension | None, life: Life | None, geometry: Geo
     """What an extension changes in the tracking of a life; nothing where none is adopted or no run has begun a life."""
     if extension is None or life is None:
         return ModelInForce()
+    from models.diagnosis.report.corrections import corrections  # start-up time: it loads the whole diagnosis
+
     return ModelInForce(
         name=ModelName(name="extended", effects=list(extension.effects)),
         weights=tuple(extension.weights.tolist()),
         course=added_course(extension, life, geometry),
         severity_exponent=extension.severity_exponent,
+        corrected=corrections(extension),
     )
 
 

@@ -54,6 +54,7 @@ def summarised(state: ClutchHistory, tracking: Tracking, evidence: ClutchMeasure
         "life": life.name,
         "from_cycles": life.origin,
         "tests": life.tests,
+        "corrected": list(state.assumptions.model.corrected),
         "rig_question": life.rig_question(pooled.new_levels),
         "places": len({measurement.progress for measurement in pooled.measurements}),
         "pace": None if pace is None else {"cycles_per_second": pace, "moment": moment_at(life.events, pace, last)},

@@ -69,7 +69,7 @@ def test_the_tutorial_and_the_tasks_run(tmp_path: Path) -> None:
             said[name] = outputs[0].stdout + outputs[1].stdout
     tutorial = said["tutorial/first-life.md"]
     assert "more cycles (95 %)" in tutorial
-    assert "The cause is named: oil temperature" in tutorial
+    assert "Cause named: oil temperature" in tutorial
     assert "extended (oil_temperature)" in tutorial
     assert '"order a set"' in tutorial
 

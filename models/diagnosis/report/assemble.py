@@ -11,13 +11,13 @@ from models.diagnosis import criteria
 from models.diagnosis.design.design import Design
 from models.diagnosis.effects.catalogue import BY_SLUG
 from models.diagnosis.effects.effect import FROM_THE_START
-from models.diagnosis.effects.fitted_effect import Estimate, FittedEffect, ranges_of
+from models.diagnosis.effects.fitted_effect import Draw, Estimate, FittedEffect, ranges_of
 from models.diagnosis.experiments.test_plan import Advice
 from models.diagnosis.explanations.posterior import Posterior
 from models.diagnosis.explanations.shapeless import outlying_run
 from models.diagnosis.explanations.sizes import Size, Sizes
 from models.diagnosis.explanations.verdict import NOTHING, Explanation, Judgement, Verdict
-from models.diagnosis.extension import build_extension
+from models.diagnosis.extension import Extension, build_extension
 from models.diagnosis.pooled_fit.baseline_fit import Baseline
 from models.diagnosis.pooled_fit.gauss_newton import Fit, FitStatus
 from models.diagnosis.pooled_fit.problem import FitProblem
@@ -171,12 +171,11 @@ def report_of(
     scatter = run_scatter(posterior.null.evidence.screened)
     candidates = candidates_of(problem, judgement, raw, sizes.by_slug, posterior.isolability)
     visible = visible_of(posterior)
-    extension = None
-    if not reason and any(draw.effects for draw in sizes.draws):
-        # effects of use are followed beyond the data only where they help to predict the last states from the first ones
-        follow = gain is not None and gain.forecast_log_score_gain > 0
-        design = problem.design
-        extension = build_extension(sizes.draws, design.facts, ranges_of(design.rows), courses=follow)
+    if law is not None:  # where what is at work is open, so is the law beside it
+        known = judgement.verdict in {Verdict.MODEL_ADEQUATE, Verdict.CAUSE_NAMED} and not reason
+        law = replace(law, adoptable=known and law.predicts)
+        if law.adoptable and extended is None:
+            extended, gain = fitted, law.gain
     report = Report(
         verdict=judgement.verdict,
         causes=judgement.causes,
@@ -197,7 +196,7 @@ def report_of(
             for slug, share in sorted(posterior.like_the_law.items(), key=lambda item: -item[1])
             if share >= criteria.LIKE_MENTIONED and slug in BY_SLUG
         ),
-        extension=extension,
+        extension=None if reason else _extension(problem, fitted, sizes, gain, law),
         not_adoptable=reason,
         notes=notes,
         statistics=statistics_of(posterior, judgement, scatter),
@@ -207,6 +206,22 @@ def report_of(
         scatter=scatter,
     )
     return replace(report, summary=summarise(report))
+
+
+def _extension(
+    problem: FitProblem, fitted: Fit, sizes: Sizes, gain: Gain | None, law: FrictionLaw | None
+) -> Extension | None:
+    """What may be adopted: the causes at work, and the law as found where it is proposed; None without either."""
+    learned = law.learned if law is not None and law.adoptable else None
+    draws = sizes.draws if any(draw.effects for draw in sizes.draws) else ()
+    if learned is not None and not draws:
+        draws = (Draw(weight=1.0, laws=fitted.laws),)
+    if not draws:
+        return None
+    # effects of use are followed beyond the data only where they help to predict the last states from the first ones
+    follow = gain is not None and gain.forecast_log_score_gain > 0
+    facts, ranges = problem.design.facts, ranges_of(problem.design.rows)
+    return build_extension(draws, facts, ranges, courses=follow, law=learned)
 
 
 def insufficient(missing: str, design: Design) -> Report:

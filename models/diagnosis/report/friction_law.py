@@ -15,10 +15,10 @@ import numpy as np
 
 from models.arrays import FloatArray
 from models.diagnosis import criteria
-from models.diagnosis.baseline.law_form import EXACT
+from models.diagnosis.baseline.law_form import EXACT, LearnedLaw
 from models.diagnosis.pooled_fit.gauss_newton import Fit, fit, sensitivities
 from models.diagnosis.pooled_fit.problem import FitProblem
-from models.diagnosis.pooled_fit.projection import Gram, Projected, gram_of, law_torque, projections_beside
+from models.diagnosis.pooled_fit.projection import Gram, Projected, gram_of, law_torque, learned_law, projections_beside
 from models.diagnosis.validation.held_out import FittedModel, Gain, measure_gain
 
 #: Draws of the posterior; bands of ln v.
@@ -59,12 +59,20 @@ class FrictionLaw:
     effect_on_mean_cof_percent: float
     effect_on_remaining_cycles_percent: float | None
     gain: Gain | None
+    learned: LearnedLaw | None  # the law as found
     curves: tuple[LawCurve, ...] = ()
+    adoptable: bool = False  # whether it is proposed in place of eq. 3
 
     @property
     def mentioned(self) -> bool:
         """Whether it is worth a sentence."""
         return self.rms_percent >= criteria.LAW_MENTIONED and self.interval_percent[0] > 0.25 * self.rms_percent
+
+    @property
+    def predicts(self) -> bool:
+        """Whether it is worth a sentence and predicts held-out runs better than eq. 3."""
+        gain = self.gain
+        return self.mentioned and gain is not None and gain.log_score_gain > 0.0 and gain.rmse_after <= gain.rmse_before
 
 
 def friction_law_of(problem: FitProblem, fitted: Fit, rng: np.random.Generator) -> FrictionLaw | None:
@@ -98,6 +106,7 @@ def friction_law_of(problem: FitProblem, fitted: Fit, rng: np.random.Generator) 
         gain=None
         if problem.noise.law == EXACT
         else measure_gain(FittedModel(exactly, alone), FittedModel(problem, fitted), rng),
+        learned=learned_law(problem, fitted),
         curves=_curves(problem, alone, fitted, torque[:, None] * drawn, rows),
     )
 

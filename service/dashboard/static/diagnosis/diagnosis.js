@@ -77,12 +77,18 @@ export function diagnosisTab(place, reader, changed) {
 
   /** @param {DiagnosisOut} shown */
   function actions(shown) {
-    const { adopted, adoptable } = shown;
+    const { adopted, adoptable, causes } = shown;
     const extended = (model?.effects.length ?? 0) > 0;
     return h(
       "div.row.buttons.adopt",
       adopted && quiet("This diagnosis is adopted: tracking and remaining life use the extended model."),
-      !adopted && adoptable && button("Adopt the extended model", () => adopt(shown), { class: "main" }),
+      !adopted &&
+        adoptable &&
+        button(
+          causes.length > 0 ? "Adopt the extended model" : "Adopt the friction curve as found",
+          () => adopt(shown),
+          { class: "main" },
+        ),
       (extended || adopted) && button("Go back to the baseline", () => goBack(shown)),
     );
   }
@@ -97,8 +103,9 @@ export function diagnosisTab(place, reader, changed) {
   }
 
   /** @param {DiagnosisOut} shown */
-  async function adopt({ causes, gain, diagnosis_id: id }) {
-    const names = namesOf(causes);
+  async function adopt(shown) {
+    const { gain, diagnosis_id: id } = shown;
+    const names = namesOf([...shown.causes, ...(shown.friction_law?.adoptable ? ["friction_law"] : [])]);
     const sure = await agreed({
       title: `Adopt ${names}?`,
       action: "Adopt it",

@@ -25,7 +25,7 @@ const SENTENCES = {
   model_adequate: () => "Nothing is left beyond noise and run-to-run scatter: the model is adequate.",
   cause_named: (causes) =>
     `The data disagree with the model, and ${causes} ${causes.includes(" and ") ? "account" : "accounts"} for it.`,
-  cause_ambiguous: (causes) => `The cause may be ${causes}: these runs cannot distinguish between them.`,
+  cause_ambiguous: (causes) => `These runs leave open what is at work: ${causes}.`,
   unexplained_structure: () => "The data disagree with the model, and no cause in the catalogue accounts for it.",
   insufficient_data: () => "There is too little data for a verdict.",
 };
@@ -34,9 +34,6 @@ const SENTENCES = {
 const NOTICES = { model_adequate: "good", cause_named: "bad", cause_ambiguous: "bad", unexplained_structure: "bad" };
 
 const MOST_ROWS = 8;
-
-/** Probability from which a cause is certain though others are open (that of what a diagnosis names). */
-const CERTAIN = 0.9;
 
 /** @type {(diagnosis: DiagnosisOut) => HTMLElement[]} the report's elements */
 export function report(diagnosis) {
@@ -64,27 +61,14 @@ function outdated({ earlier_life: earlier, stale }) {
   return stale ? h("b", " Runs were added after this diagnosis: start a new one.") : null;
 }
 
-/** @typedef {{ verdict: string | null, causes?: string[], candidates?: CandidateOut[] }} Judged */
+/** @typedef {{ verdict: string | null, causes?: string[] }} Judged */
 
-/** @type {(diagnosis: Judged) => string[]} of an ambiguous verdict the causes that are certain */
-function certain({ verdict, causes = [], candidates: all = [] }) {
-  const likely = all.filter((candidate) => (candidate.probability ?? 0) >= CERTAIN).map(({ effect }) => effect);
-  return verdict === "cause_ambiguous" ? causes.filter((cause) => likely.includes(cause)) : [];
-}
-
-/** @param {Judged} diagnosis */
-export function heading(diagnosis) {
-  const verdict = diagnosis.verdict ?? "";
-  return certain(diagnosis).length > 0 ? "Cause certain, others possible" : (VERDICTS[verdict] ?? words(verdict));
-}
+/** @type {(diagnosis: Judged) => string} */
+export const heading = ({ verdict }) => VERDICTS[verdict ?? ""] ?? words(verdict ?? "");
 
 /** @type {(diagnosis: Judged) => string} the verdict as a sentence */
-export function sentence(diagnosis) {
-  const sure = certain(diagnosis);
-  const verdict = sure.length > 0 ? "cause_named" : diagnosis.verdict;
-  const names = (sure.length > 0 ? sure : (diagnosis.causes ?? [])).map((cause) =>
-    cause === "uncatalogued" ? "an unknown cause" : words(cause).toLowerCase(),
-  );
+export function sentence({ verdict, causes = [] }) {
+  const names = causes.map((cause) => (cause === "uncatalogued" ? "an unknown cause" : words(cause).toLowerCase()));
   const last = names.at(-1) ?? "the named cause";
   const between = verdict === "cause_ambiguous" ? "or" : "and";
   const joined = names.length > 1 ? `${names.slice(0, -1).join(", ")} ${between} ${last}` : last;
