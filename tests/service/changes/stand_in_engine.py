@@ -139,7 +139,14 @@ def diagnose(campaign: Campaign, *, rng: np.random.Generator) -> Report:
     """A cause is named from three tests on."""
     if len(campaign.stationary) < 3:
         return _report(campaign, None)
-    content = {"shift_nm": SHIFT_NM, "course_nm": COURSE_NM, "drawn": float(rng.standard_normal())}
+    shift = {"slug": "torque_zero_shift", "amplitude": SHIFT_NM}
+    content = {
+        "shift_nm": SHIFT_NM,
+        "course_nm": COURSE_NM,
+        "drawn": float(rng.standard_normal()),
+        "law": None,
+        "draws": [{"weight": 1.0, "effects": [shift]}],
+    }
     return _report(campaign, Extension(effects=("torque_zero_shift", "running_in"), content=content))
 
 

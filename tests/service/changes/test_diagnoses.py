@@ -181,6 +181,8 @@ def test_what_is_adopted_moves_every_answer_and_back_again(
     assert after["current"]["mean_cof"] < 0.95 * shown["current"]["mean_cof"]
     listed = client.get("/v1/clutches").json()["items"][0]["summary"]
     assert (listed["current"], listed["model"]) == (after["current"], EXTENDED)
+    corrected = "Corrected: the torque sensor reads 1.5 Nm too much. Zero the torque sensor before each test."
+    assert client.get(BASE).json()["action"] == corrected
     for at in ("degradation", "engagement", "remaining-useful-life?method=ukf&pressure_bar=5&at_cycles=2500"):
         assert client.get(f"{BASE}/{at}").json()["model"] == EXTENDED, at
     assert client.get(f"{BASE}/runs").json() == receipts

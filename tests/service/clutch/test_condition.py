@@ -195,6 +195,12 @@ def advising(test: str, effect: str) -> LatestDiagnosis:
             "Nothing to do: carry on testing.",
         ),
         (
+            summary(9450.0, corrected=["Corrected: the clutch gets 0.38 bar less than the gauge reads. Repair the gauge."]),
+            None,
+            "Normal: safe for 9,400 more cycles (95 %); 50 % chance of 9,400 or more",
+            "Corrected: the clutch gets 0.38 bar less than the gauge reads. Repair the gauge.",
+        ),
+        (
             summary(2000.0, pace=PACE), None,
             "Maintenance required: less than 20 % of its life may be left; safe for 2,000 more cycles (95 %): "
             "2 days at the pace so far, counted from the last run on 1 Dec 2026; 50 % chance of 2,000 or more",

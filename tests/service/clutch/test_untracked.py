@@ -89,7 +89,9 @@ def test_an_open_sweep_is_taken_in_and_said_to_be_one(client: TestClient, databa
     assert run.plateaus.torque.size == 25
     post(client, stationary(0, run_id="s0"))
     known = campaign(database_url)
-    shifted = SimpleNamespace(weights=np.ones(1), artefact=lambda run, _: np.ones((1, run.plateaus.torque.size)))
+    shifted = SimpleNamespace(
+        weights=np.ones(1), artefact=lambda run, _: np.ones((1, run.plateaus.torque.size)), law=None
+    )
     found = corrected_cofs(shifted, known.record, known.life, known.runs, known.campaign.stationary)  # type: ignore[arg-type]
     assert found.keys() == {"s0"}  # an adopted model corrects no open test
     one = {"pressure_bar": [0.0], "speed_rpm": [500.0], "torque_nm": [-0.1], "torque_sd_nm": [0.01]}

@@ -25,8 +25,10 @@ from models.diagnosis.effects.history import BY_CLOCK, BY_USE, STATIC, WHOLE
 from models.diagnosis.effects.moving import FILM, FIRST_ORDER, LEAST_TIME, MOST_POWER, THICKNESS, usual_slope
 from models.diagnosis.effects.readings import DAYS, STRAIGHT
 from models.diagnosis.effects.thermal import HERSEY, log_viscosity_ratio, viscosity
+from models.diagnosis.explanations.evidence import evidence_of
 from models.diagnosis.noise.estimate import estimate_noise, first_noise
 from models.diagnosis.pooled_fit.baseline_fit import fit_baseline
+from models.diagnosis.pooled_fit.gauss_newton import fit
 from models.diagnosis.pooled_fit.projection import gram_of, project
 from tests.measuring import APPENDIX, parts
 from tests.models.diagnosis.campaigns import Study, campaign, of_size, scene_of, study
@@ -60,6 +62,42 @@ def test_no_amplitude_no_change_and_all_changes_are_finite(effect: Effect, scene
         assert effect.kind is not Kind.LAG or np.abs(column[scene.points.steady]).max() == 0
         # small amplitudes act in proportion
         assert np.abs(two - column)[moving].max() < 0.05 * np.abs(column[moving]).max()
+
+
+def test_no_size_is_beyond_what_is_possible(scene: Scene) -> None:
+    """A reading was said to contain 414 % of the previous plateau, and heat to take 360 % of friction."""
+    facts = scene.facts
+    lowest, period = facts.lowest_pressure, facts.shortest_period
+    assert lowest is not None
+    assert period is not None
+    assert lowest == pytest.approx(scene.points.pressure[scene.points.engaged > 0].min())
+    bounds = {
+        "unsettled_dwell": (0.0, 1.0),
+        "interface_heating": (0.0, 0.95),
+        "hydrodynamic_drag": (0.0, 0.5 * facts.usual_torque),
+        "pressure_offset": (-lowest, lowest),
+        "channel_delay": (-period, period),
+        "accelerated_wear": (0.0, 1.0),
+        "oil_change": (-1.0, 4.0),
+    }
+    for slug, (low, high) in bounds.items():
+        effect = BY_SLUG[slug].sized(facts)
+        assert (effect.lowest, effect.highest) == pytest.approx((low, high)), slug
+        assert effect.within(2.0 * high) == effect.highest
+        assert effect.within(-3.0 * high) == (-3.0 * high if low == 0.0 else effect.lowest)  # a fit may pass through
+
+
+def test_a_fit_ends_at_the_bound_that_the_data_ask_to_pass(given: Study) -> None:
+    """Four times the difference from the plateau before in each reading, which no share is."""
+    of_four = of_size("unsettled_dwell", 4.0, (0.0, 0.0))
+    begun = of_size("unsettled_dwell", 0.5, (0.0, 0.0))
+    planted = of_four.rows(given.design, given.baseline.fit.prediction)
+    problem = replace(given.problem, design=replace(given.design, torque=given.design.torque + planted))
+    found = fit(problem, given.baseline.fit.laws, [begun], steps=10)
+    (dwell,) = found.effects
+    assert dwell.amplitude == 1.0
+    assert not dwell.free[0]
+    assert np.isfinite(evidence_of(problem, found, smooth=False).whole)
 
 
 def test_units_of_a_few(scene: Scene) -> None:
