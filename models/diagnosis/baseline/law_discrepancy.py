@@ -63,14 +63,16 @@ def law_discrepancy(design: Design, laws: Laws, *, moving: bool) -> LawDiscrepan
 
 def _moved(laws: Laws, first: float, last: float) -> tuple[FloatArray, FloatArray]:
     """ln V_S [NODES] over the places of pressure at the first state, and over those of √life at the middle pressure, less
-    that of both; each within MOST_MOVED."""
+    that of both; none where it moves by more than MOST_MOVED."""
     lowest, highest = laws.frame.lowest, laws.frame.highest
     pressures = lowest + (highest - lowest) * np.clip(_NODES * (1.0 + 2.0 * MARGIN) - MARGIN, 0.0, 1.0)
     cycles, middle = first + (last - first) * _NODES**2, np.full(_NODES.size, 0.5 * (lowest + highest))
     over = (pressures, np.full(_NODES.size, first)), (middle, cycles)
     by_pressure, by_life = (np.log(laws.parameters(*places)[:, STRIBECK_VELOCITY]) for places in over)
-    usual = by_life[0]
-    return np.clip(by_pressure - usual, -_MOST_MOVED, _MOST_MOVED), np.clip(by_life - usual, -_MOST_MOVED, _MOST_MOVED)
+    by_pressure, by_life = by_pressure - by_life[0], by_life - by_life[0]
+    if max(np.abs(by_pressure).max(), np.abs(by_life).max()) > _MOST_MOVED:
+        return np.zeros(1), np.zeros(1)
+    return by_pressure, by_life
 
 
 def sizes_considered() -> list[tuple[LawSizes, float]]:

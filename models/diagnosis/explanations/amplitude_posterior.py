@@ -115,9 +115,9 @@ def _along_amplitude(
     steps = np.unique([*np.linspace(low.min(), high.max(), _WIDE), *np.linspace(low[1], high[1], _NEAR)])
     least, most = fitted.effect.lowest - fitted.amplitude, fitted.effect.highest - fitted.amplitude
     for bound, inwards in ((least, 1.0), (most, -1.0)):
-        if np.isfinite(bound):
-            # how fast both densities fall off inwards, where the data ask for what is beyond
-            falls = inwards * left * (bound - middle)
+        # how fast both densities fall off inwards, where the data ask for what is beyond
+        falls = inwards * left * (bound - middle)
+        if np.isfinite(bound) and (falls.max() > 0.0 or steps[0] < bound < steps[-1]):
             ends = inwards * _REACH / np.maximum(falls, np.sqrt(left)) * np.linspace(0.0, 1.0, _NEAR)[1:, None]
             steps = np.concatenate([steps, [bound], (bound + ends[:, falls > 0.0]).ravel()])
     steps = np.unique(steps[(steps >= least) & (steps <= most)])

@@ -3,7 +3,6 @@
 p(nothing) >= LIKELY                                            the model is adequate
 C = the causes of probability >= SURE,
     p(uncatalogued) <= 1 - SURE and p(exactly C) >= LIKELY      C is named
-    whatever is uncatalogued beside them, their sizes hold      C is named, and something uncatalogued beside it
 p(uncatalogued) >= LIKELY of all that is not nothing            structure without a name; where C is not empty ambiguous: C
                                                                 and something uncatalogued
 otherwise                                                       ambiguous: the smallest set of explanations that holds
@@ -46,11 +45,8 @@ def explanations_of(posterior: Posterior) -> tuple[Explanation, ...]:
     return tuple(Explanation(effects=effects, probability=share) for effects, share in ranked)
 
 
-def decide(
-    explanations: Sequence[Explanation], holding: frozenset[str] = frozenset()
-) -> tuple[Verdict, tuple[str, ...]]:
-    """The verdict and its causes; UNCATALOGUED may stand among those of an ambiguous one. `holding` are the causes whose
-    sizes are alike whatever is beside them."""
+def decide(explanations: Sequence[Explanation]) -> tuple[Verdict, tuple[str, ...]]:
+    """The verdict and its causes; UNCATALOGUED may stand among those of an ambiguous one."""
     shares = {explanation.effects: explanation.probability for explanation in explanations}
     nothing = shares.get((), 0.0)
     if nothing >= criteria.LIKELY:
@@ -58,10 +54,7 @@ def decide(
     unknown = sum(share for effects, share in shares.items() if UNCATALOGUED in effects)
     sure = tuple(slug for slug, share in probabilities_by_slug(explanations).items() if share >= criteria.SURE)
     exactly = sum(share for effects, share in shares.items() if set(effects) == set(sure))
-    beside_unknown = sum(share for effects, share in shares.items() if set(effects) == {*sure, UNCATALOGUED})
     if sure and unknown <= 1.0 - criteria.SURE and exactly >= criteria.LIKELY:
-        return Verdict.CAUSE_NAMED, sure
-    if sure and holding.issuperset(sure) and exactly + beside_unknown >= criteria.SURE:
         return Verdict.CAUSE_NAMED, sure
     if unknown >= criteria.LIKELY * (1.0 - nothing):
         return (Verdict.CAUSE_AMBIGUOUS, (*sure, UNCATALOGUED)) if sure else (Verdict.UNEXPLAINED_STRUCTURE, ())
@@ -84,7 +77,7 @@ def smallest(shares: Mapping[tuple[str, ...], float]) -> list[tuple[str, ...]]:
 def judge(posterior: Posterior) -> Judgement:
     """The judgement before validation: the verdict, and what was fitted behind it."""
     explanations = explanations_of(posterior)
-    verdict, causes = decide(explanations, _holding(posterior))
+    verdict, causes = decide(explanations)
     fitted = _fitted(posterior)
     shares = {explanation.effects: explanation.probability for explanation in explanations}
     sets = {Verdict.CAUSE_NAMED: [causes], Verdict.CAUSE_AMBIGUOUS: smallest(shares)}.get(verdict, [])
@@ -108,24 +101,6 @@ def judge(posterior: Posterior) -> Judgement:
             if len(a.causes) == 1 and not a.unknown
         },
     )
-
-
-def _holding(posterior: Posterior) -> frozenset[str]:
-    """The causes of which any two likely fits differ by less than ALIKE, and by no sign; and vibrations, which no average
-    shows."""
-    sizes: dict[str, list[float]] = {}
-    for alternative, share in posterior.probabilities.items():
-        if share >= criteria.NEGLIGIBLE and alternative in posterior.nodes:
-            for effect in posterior.nodes[alternative].fit.effects:
-                sizes.setdefault(effect.effect.slug, []).append(effect.amplitude)
-    alike = {slug for slug, known in sizes.items() if _alike(known)}
-    return frozenset({*alike, *posterior.vibrations})
-
-
-def _alike(sizes: Sequence[float]) -> bool:
-    """Whether the smallest is more than the share ALIKE of the largest, of one sign."""
-    smallest_size, largest = min(sizes, key=abs), max(sizes, key=abs)
-    return smallest_size / largest > criteria.ALIKE if largest else False
 
 
 def _fitted(posterior: Posterior) -> tuple[Fitted, ...]:

@@ -286,12 +286,6 @@ def _named(report: Report) -> list[Sentence]:
             seen = [note.partition(": ")[2] for note in report.notes if note.startswith(f"{item.effect}: ")]
             sentences += [Sentence(physics, SHOULD), *(Sentence(f"Here {note}") for note in seen)]
             sentences.append(Sentence(stated(item.estimate, item.effect)))
-    unknown = sum(item.probability for item in report.explanations if {*causes, UNCATALOGUED} <= set(item.effects))
-    if unknown >= criteria.LIKELY:
-        beside = "it, without changing its size" if len(causes) == 1 else "them, without changing their sizes"
-        sentences.append(
-            Sentence(f"Something unknown is at work beside {beside} (probability {probability(unknown)}).")
-        )
     companions = [
         f"{effect_name(item.effect)} (probability {probability(item.probability)})"
         for item in report.candidates
@@ -332,8 +326,8 @@ def _ambiguous(report: Report) -> list[Sentence]:
 
 
 def _certain(report: Report) -> tuple[str, ...]:
-    """The causes that are SURE to be at work, and of which the sign is known; none beside something unknown, by which their
-    sizes would change."""
+    """The causes that are SURE to be at work, and of which the sign is known; none beside something unknown, which may be
+    all of it."""
     if UNCATALOGUED in report.causes:
         return ()
     shares = probabilities_by_slug(report.explanations)

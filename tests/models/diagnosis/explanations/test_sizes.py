@@ -34,7 +34,7 @@ def shifted() -> Report:
 def test_an_offset_whose_sign_depends_on_the_course_assumed_is_no_adoption(creeping: Report) -> None:
     assert "pressure_offset" in creeping.causes
     assert creeping.extension is None
-    assert "do not determine the size of pressure offset" in creeping.not_adoptable
+    assert "not even the sign of pressure offset is sure" in creeping.not_adoptable
     assert creeping.not_adoptable in creeping.summary
     estimate = next(each for each in creeping.candidates if each.effect == "pressure_offset").estimate
     low, high = estimate.interval
