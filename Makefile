@@ -66,7 +66,7 @@ SLIM := $(LOCK) $(foreach name,$(UNUSED),--no-emit-package $(name))
 # what the first run of the tests compiles, the next ones read: a third of what `make quick` takes
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help compiled docs gallery reference adoption demo shell test quick slow faults check check-python check-javascript lowest benchmark load scale real figures architecture blind law oracle visible mutants plausibility score rivals picture lock clean
+.PHONY: help compiled docs gallery reference adoption law_adoption demo shell test quick slow faults check check-python check-javascript lowest benchmark load scale real figures architecture blind law oracle visible mutants plausibility score rivals picture lock clean
 .DELETE_ON_ERROR:
 
 # the demo's pages link to /help: where it cannot be built, as without the internet, its page says so
@@ -160,6 +160,9 @@ architecture: $(VENV)/.tests
 
 law: $(VENV)/.tests
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.lab.law $(ARGS)
+
+law_adoption: $(VENV)/.tests
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.lab.law.adoption $(ARGS)
 
 blind: $(VENV)/.tests
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.blind$(if $(ABLATE),.ablations,$(if $(SUBSET),.subset)) $(ARGS)

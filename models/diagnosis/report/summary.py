@@ -429,7 +429,7 @@ def _error(misfit: Misfit | None, axes: Sequence[str]) -> str:
 
 def _adoption(report: Report) -> list[Sentence]:
     """What adopting a named cause would do, or why it may not be adopted."""
-    adoptable = () if report.extension is None else report.extension.effects
+    adoptable = [] if report.extension is None else [slug for slug in report.extension.effects if slug in BY_SLUG]
     if report.not_adoptable or report.gain is None or not adoptable:
         return [Sentence(report.not_adoptable)]
     it = "it" if len(report.causes) == 1 else "them"

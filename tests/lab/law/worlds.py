@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 
@@ -66,6 +67,12 @@ def of_curves(kind: str, seed: int) -> World:
     record = ClutchIn.model_validate(clutch)
     taken = [run_of(read_run(json.dumps(run).encode()), origin=0.0) for run in runs]
     return World(campaign_of(record, taken), truth["expected"], truth["size"])
+
+
+def sent_of_curves(kind: str, seed: int) -> tuple[dict[str, Any], list[dict[str, Any]], float]:
+    """The same as it is sent, a clutch and its runs, and the cycles at which its true mean COF is half of the first."""
+    clutch, runs, truth = _curves().one(kind, seed)
+    return clutch | {"clutch_id": "measured"}, runs, float(truth["end"])
 
 
 #: Shares of the fall g(u) of other Stribeck forms, u = v/V_S, each half fallen where eq. 3 is.
