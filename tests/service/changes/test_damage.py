@@ -40,24 +40,17 @@ def damage(path: Path, statement: str) -> None:
 def answers(client: TestClient) -> list[Any]:
     """What is said of the clutch after its next test, without what says when."""
     receipt = post_run(client, NEXT)
+    (listed,) = client.get("/v1/clutches?find=c1").json()["items"]
     remaining = client.get("/v1/clutches/c1/remaining-useful-life").json()
     del receipt["received_at"], remaining["revision"]
-    return [receipt, remaining]
-
-
-def listed(path: Path) -> list[Any]:
-    """What a service that starts now lists of the clutch."""
-    with client_on(f"sqlite:///{path}") as client:
-        (item,) = client.get("/v1/clutches?find=c1").json()["items"]
-    return [item["summary"], item["state"]]
+    return [receipt, remaining, listed["summary"], listed["state"]]
 
 
 @pytest.fixture(scope="module")
 def intact(stored: Path, tmp_path_factory: pytest.TempPathFactory) -> list[Any]:
-    path = Path(shutil.copy(stored, tmp_path_factory.mktemp("intact") / "copy.db"))
+    path = shutil.copy(stored, tmp_path_factory.mktemp("intact") / "copy.db")
     with client_on(f"sqlite:///{path}") as client:
-        answered = answers(client)
-    return [*answered, *listed(path)]
+        return answers(client)
 
 
 #: What follows from runs, and how it is damaged.
@@ -83,8 +76,7 @@ def test_a_damaged_result_is_computed_again_before_the_next_test_is_tracked(
     assert "10 runs of 2 clutches were checked" in said
     assert "c2" not in said
     with client_on(f"sqlite:///{path}") as client:
-        answered = answers(client)
-    assert [*answered, *listed(path)] == intact
+        assert answers(client) == intact
     assert any("again from its runs" in record.getMessage() for record in caplog.records)
     assert "0 findings" in clutchlife("verify", "--database", f"sqlite:///{path}")
 
