@@ -132,6 +132,7 @@ def _events(
 ) -> tuple[list[Event], list[Event]]:
     """Accepted runs as the history sees them, mean COF as the model in force corrects it; and held ones, with the mean COFs
     that they would have in it. All of them have keys `beyond` that one."""
+    runs.refuse_damaged(connection, row.clutch_id, beyond)
     cofs = results.cofs_of(connection, row.clutch_id, beyond)
     corrected, new_levels = assumptions.corrected_cofs_of(connection, row.clutch_id, beyond), _new_levels(row)
     accepted, held = [], []

@@ -15,6 +15,9 @@ from service.errors import InvalidError
 ALL_ITEMS = 1_000_000
 #: Characters of a cursor that are read. Derived: a clutch's name has 128, base64 makes a third more of them.
 LONGEST_CURSOR = 600
+#: The greatest number of a cursor. Derived: the greatest up to which doubles hold every whole number; databases refuse those
+#: of more than 63 bits.
+_GREATEST = 2.0**53
 #: Where a page ended: a number, and a name where that is not unique.
 Place = tuple[float, str]
 Row = TypeVar("Row")
@@ -34,7 +37,7 @@ def from_cursor(cursor: str | None) -> Place | None:
         place = (float(number), str(name).encode().decode())
     except (ValueError, TypeError, OverflowError, RecursionError, binascii.Error):
         place = (math.nan, "")
-    if not math.isfinite(place[0]):
+    if not abs(place[0]) <= _GREATEST:  # NaN is not
         message = f"cursor must be the `next` of the previous page, got {cursor[:80]!r}"
         raise InvalidError.of(message, code="cursor", pointer="/query/cursor", value=cursor)
     return place

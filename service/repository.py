@@ -612,6 +612,16 @@ def content_now(row: RunRow, sent: IncomingRun) -> str:
     return row.content_sha256 if sha256 == read_again else sha256
 
 
+def _refuse_restated(row: RunRow, trail: Mapping[str, Any]) -> None:
+    """Raise DamagedData where a run has not the state or the cycles that the audit trail says: neither follows from what was
+    sent."""
+    now = summary(row)
+    for name, stated in ({"state": runs.ACCEPTED} | dict(trail)).items():
+        if name in ("state", "cycles") and now[name] != stated:
+            said = f"the audit trail says {stated!r}, the run {now[name]!r}"
+            raise DamagedData(f"the {name} of run {row.run_id} is damaged ({said}): restore a backup")
+
+
 def _refuse_changed(database: Database, row: RunRow) -> None:
     """Raise DamagedData where what is stored of a run is not what was sent."""
     with database.reading() as connection:
@@ -656,9 +666,13 @@ def recorded(database: Database, state: ClutchHistory, *, whole: bool = False, d
         if damaged:
             allow_damage(connection)
         rows, aside = runs.page(connection, state.clutch_id), set_aside(connection, state.clutch_id)
+        failing = runs.damaged(connection, state.clutch_id) if damaged else set()
+        trail = changes.newest_of_runs(connection, state.clutch_id) if failing else {}
     if damaged:
         for row in rows:
             _refuse_changed(database, row)
+            if row.run_id in failing:
+                _refuse_restated(row, trail.get(row.run_id, {}))
     reader = (
         _loaded_reader(database, state.record, rows)
         if whole

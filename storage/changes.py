@@ -79,6 +79,11 @@ def page(
     return _rows.all(connection.execute(query))
 
 
+def newest_of_runs(connection: Connection, clutch_id: str) -> dict[str, Json]:
+    """What the trail says of a clutch's runs after the last change of each, by run_id; the others nobody changed."""
+    return {row.run_id: row.after for row in reversed(page(connection, clutch_id)) if row.run_id is not None}
+
+
 def last_of_history(connection: Connection, clutch_id: str) -> int:
     """The revision of the last change of what the clutch's history holds, 0 where there was none."""
     of_history = (change.c.clutch_id == clutch_id, change.c.action.in_(OF_HISTORY))

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from sqlalchemy import Connection, Select, delete, select
 
+from storage.checksums import allows_damage, refuse_damaged
 from storage.dialects import upsert
 from storage.encoding import Json, Rows
 from storage.engine.errors import DamagedData
@@ -81,16 +82,20 @@ def fits_of_run(connection: Connection, run_key: int) -> list[FitRow]:
 
 def cofs_of(connection: Connection, clutch_id: str, beyond: int = 0) -> dict[int, dict[float, tuple[float, float]]]:
     """run_key -> pressure -> mean COF and its deviation, of all curves that determine it: as much as tracking needs. Of runs
-    with keys `beyond` that one."""
+    with keys `beyond` that one. Raises DamagedData."""
     cofs: dict[int, dict[float, tuple[float, float]]] = {}
     query = (
-        select(fit.c.run_key, fit.c.pressure, fit.c.mean_cof, fit.c.mean_cof_sd)
+        select(fit)
         .join(run, run.c.run_key == fit.c.run_key)
         .where(run.c.clutch_id == clutch_id, run.c.run_key > beyond, fit.c.mean_cof.is_not(None))
         .order_by(fit.c.run_key, fit.c.pressure)
     )
-    for run_key, pressure, mean, deviation in connection.execute(query):
-        cofs.setdefault(run_key, {})[pressure] = (mean, deviation)
+    rows = connection.execute(query)
+    damage_allowed = allows_damage(rows, fit)
+    for row in rows.mappings():
+        if not damage_allowed:
+            refuse_damaged(fit, dict(row))
+        cofs.setdefault(row["run_key"], {})[row["pressure"]] = (row["mean_cof"], row["mean_cof_sd"])
     return cofs
 
 

@@ -9,6 +9,7 @@ from typing import Any
 
 from sqlalchemy import ColumnElement, Connection, Select, TextClause, and_, exists, func, select, tuple_
 
+from storage import checksums
 from storage.checksums import amend
 from storage.dialects import DialectPair, json_text, json_value
 from storage.encoding import Json, Rows
@@ -188,6 +189,25 @@ def in_history(connection: Connection, clutch_id: str) -> list[RunInOrder]:
 def after_key(connection: Connection, clutch_id: str, run_key: int) -> list[RunInOrder]:
     """The runs of a clutch that arrived after the one with that key, in order, whatever their state."""
     return _in_order(connection, clutch_id, run.c.run_key > run_key)
+
+
+def refuse_damaged(connection: Connection, clutch_id: str, beyond: int = 0) -> None:
+    """Raise DamagedData where a run of a clutch with a key `beyond` that one fails its checksum, whatever its state: what is
+    read of it in part is not checked."""
+    rows = connection.execute(_whole(clutch_id, beyond))
+    if not checksums.allows_damage(rows, run):
+        for row in rows.mappings():
+            checksums.refuse_damaged(run, dict(row))
+
+
+def damaged(connection: Connection, clutch_id: str) -> set[str]:
+    """The names of a clutch's runs that fail their checksums."""
+    rows = connection.execute(_whole(clutch_id, 0)).mappings()
+    return {row["run_id"] for row in rows if checksums.fails(run, dict(row))}
+
+
+def _whole(clutch_id: str, beyond: int) -> Select[Any]:
+    return select(run).where(run.c.clutch_id == clutch_id, run.c.run_key > beyond)
 
 
 def last_key(connection: Connection, clutch_id: str) -> int:

@@ -31,8 +31,8 @@ from storage.webhooks import DeliveryRow, WaitingRow, WebhookRow
 #: [s] Between two looks into the outbox, and at the clock for silent rigs. Chosen: an alarm arrives while the page still
 #: loads; a rig is silent for hours.
 LOOK_SECONDS, CLOCK_SECONDS = 0.5, 10.0
-#: [s] What another service has begun to send is left to it for so much longer than it would pause, and an attempt whose end
-#: could not be stored is made again. Derived: an attempt, its name's resolution, a busy database.
+#: [s] What another service has begun to send is left to it for so much longer than it would pause. Derived: an attempt, its
+#: name's resolution, a busy database.
 LEASE_SECONDS = 60.0
 #: Attempts at once. Chosen: one receiver that does not answer holds up no other, for of each there is one at a time.
 _AT_ONCE = 8
@@ -150,17 +150,18 @@ class Outbox:
             self._planned[row.delivery_key] = (row.attempts, row.last_attempt_at), time.monotonic() + pause
 
     def _attempt(self, row: DeliveryRow, receiver: WebhookRow, *, private: bool) -> None:
+        tried = row
         try:
             secret, name = receiver.secret, row.delivery_id
             ended = notify.send(receiver.address, row.body.encode(), secret=secret, delivery_id=name, private=private)
             with self._database.writing(of="outbox") as connection:
                 tried = _store(connection, row, ended)
-            self._plan(tried, pause_after(tried.attempts))
         except StorageError as error:
             _log.warning("delivery %s is tried again: %s", row.delivery_id, error)
-        except Exception:  # noqa: BLE001  (it is due again when its time has run out)
+        except Exception:  # noqa: BLE001  (it is tried again as after any attempt that failed)
             _log.exception("delivery %s", row.delivery_id)
         finally:
+            self._plan(tried, pause_after(tried.attempts))
             with self._change:
                 self._busy.discard(row.webhook_id)
             self.wake()

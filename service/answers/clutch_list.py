@@ -58,7 +58,7 @@ def page_as_json(
     """A page of the clutches of a choice; each one's item is made once for its revision, verdict and alarms. If they are not
     by name, a page's place is how many clutches are before it."""
     named, limit = sort == "name", part.limit
-    before = offset + (0 if named else int(part.number or 0))
+    before = offset + (0 if named else int(max(0.0, part.number or 0.0)))
     with database.reading() as connection:
         rows = clutches.page(
             connection,

@@ -1,9 +1,9 @@
 """What a connection may take before it has asked for anything: the server's own protocol, with bounds that it lacks.
 
-The head of a request is bounded in bytes (431) and in time (408), trailers after its body too, and one address has only so
-many connections: else whoever opens some hundreds and says nothing uses up the files that the process may have open, and one
-that sends header lines without end fills its memory, before any key is looked at. A reader that does not take a piece of its
-answer in time is cut off.
+The head of a request is bounded in bytes and lines (431), arguments (414) and time (408), trailers after its body too, and
+one address has only so many connections: else whoever opens some hundreds and says nothing uses up the files that a process
+may have open, and one that sends header lines without end fills its memory, before any key is looked at. A reader that does
+not take a piece of its answer in time is cut off.
 """
 
 import asyncio
@@ -20,7 +20,9 @@ from service.web.limits import (
     HEAD_SECONDS,
     LINGER_SECONDS,
     MAX_AHEAD,
+    MAX_ARGUMENTS,
     MAX_HEAD_BYTES,
+    MAX_HEAD_LINES,
     PIECE_BYTES,
     RETRY_AFTER_SECONDS,
     TAKEN_SECONDS,
@@ -32,7 +34,11 @@ _SEPARATORS = len(": \r\n")
 _PIECE = 1 << 12
 _HEAD_TOO_LARGE = (
     http.HTTPStatus.REQUEST_HEADER_FIELDS_TOO_LARGE,
-    f"the head of a request may have at most {MAX_HEAD_BYTES} bytes",
+    f"the head of a request may have at most {MAX_HEAD_BYTES} bytes and {MAX_HEAD_LINES} lines",
+)
+_TOO_MANY_ARGUMENTS = (
+    http.HTTPStatus.REQUEST_URI_TOO_LONG,
+    f"an address may have at most {MAX_ARGUMENTS} arguments",
 )
 
 
@@ -50,6 +56,8 @@ def bounded(
                 None  # ends the connection unless what was written is taken before
             )
             self._head_bytes = 0  # of the request's lines that the parser has passed on, its trailers among them
+            self._head_lines = 0
+            self._url_marks = 0  # of the address, each before another argument
             self._held_bytes = 0  # that arrived since the parser passed anything on: it keeps what is unfinished
             self._in_head = False
             self._wrong: tuple[http.HTTPStatus, str] | None = None  # why the parsing was ended
@@ -98,15 +106,19 @@ def bounded(
             super().connection_lost(exc)
 
         def on_message_begin(self) -> None:
-            self._head_bytes = self._held_bytes = 0
+            self._head_bytes = self._held_bytes = self._head_lines = self._url_marks = 0
             self._in_head = True
             super().on_message_begin()
 
         def on_url(self, url: bytes) -> None:
             self._count(len(url))
+            self._url_marks += url.count(b"&")
+            if self._url_marks >= MAX_ARGUMENTS:
+                self._end_parsing(*_TOO_MANY_ARGUMENTS)
             super().on_url(url)
 
         def on_header(self, name: bytes, value: bytes) -> None:
+            self._head_lines += 1
             self._count(len(name) + len(value) + _SEPARATORS)
             super().on_header(name, value)
 
@@ -123,7 +135,7 @@ def bounded(
             super().on_body(body)
 
         def on_message_complete(self) -> None:
-            self._head_bytes = self._held_bytes = 0
+            self._head_bytes = self._held_bytes = self._head_lines = 0
             super().on_message_complete()
 
         def send_400_response(self, msg: str) -> None:
@@ -135,7 +147,7 @@ def bounded(
         def _count(self, size: int) -> None:
             self._held_bytes = 0
             self._head_bytes += size
-            if self._head_bytes > MAX_HEAD_BYTES:
+            if self._head_bytes > MAX_HEAD_BYTES or self._head_lines > MAX_HEAD_LINES:
                 self._end_parsing(*_HEAD_TOO_LARGE)
 
         def _end_parsing(self, status: http.HTTPStatus, text: str) -> NoReturn:

@@ -47,6 +47,9 @@ SLOWEST_BODY_BYTES_PER_SECOND = 1 << 16
 #: Bytes that the head of a request may have, its trailers included, and seconds within which it is complete. Chosen: eight
 #: times what nginx and Apache take by default; a rig's bad line needs two seconds.
 MAX_HEAD_BYTES, HEAD_SECONDS = 1 << 16, 10.0
+#: Lines of a head, and arguments of an address. Chosen: what Apache takes by default; a browser sends twenty lines, and no
+#: route has thirty arguments. Each is looked at many times on the event loop.
+MAX_HEAD_LINES = MAX_ARGUMENTS = 100
 #: Requests that one connection may send while an earlier one of its is answered. Chosen: browsers send none ahead.
 MAX_AHEAD = 16
 #: Seconds for which what a refused connection still sends is thrown away. Chosen: several round trips.

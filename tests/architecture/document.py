@@ -45,6 +45,6 @@ def measured() -> dict[str, str]:
     errands = {
         "get": rooms.entered(rooms.get_life),
         "post": rooms.entered(rooms.post_run),
-        "diagnosis": rooms.entered(rooms.diagnose, warm=False, but=frozenset()),
+        "diagnosis": rooms.entered(rooms.diagnose, warm=False, jobs=True),
     }
     return {name: way(paths) for name, paths in errands.items()}

@@ -2,17 +2,22 @@
 
 A service in this process, on a database of its own, runs each errand once to warm up and once more while it is watched;
 routes run in a pool of threads, so that every thread is watched. A file is entered where a function of it is called.
+
+Threads that are there before the errand run beside the request, on a busy machine in another order than on an idle one. So
+the files that the request's own threads enter come first, then those of what computes for it.
 """
 
 import sys
 import tempfile
 import threading
+from collections import defaultdict
 from collections.abc import Callable, Set
 from pathlib import Path
 from types import FrameType
 
 from fastapi.testclient import TestClient
 
+from service.web.limits import LONGEST_WAIT_SECONDS
 from tests.architecture.source import ROOT
 from tests.service.clients import client_on
 from tests.support import stationary
@@ -21,24 +26,35 @@ from tests.support import stationary
 COUNTED = ("service", "storage")
 PRESSURES = (4.0, 5.0, 6.0)
 EARLIER_RUNS = 4
-#: Threads that look for jobs and keep hold of them, at the workers, and for what receivers of alarms are to be sent.
-JOBS: Set[str] = {"jobs", "lease", "outbox", "workers"}
+#: Threads that look from time to time, at the workers, for what receivers of alarms are to be sent, and at a job's lease:
+#: what they enter depends on how long an errand takes.
+BESIDE: Set[str] = {"lease", "outbox", "workers"}
+#: The thread that does jobs.
+JOBS = "jobs"
 
 
-def entered(errand: Callable[[TestClient, str], None], *, warm: bool = True, but: Set[str] = JOBS) -> list[str]:
-    """The files of this process that an errand enters, in that order, on one of two clutches of some stationary runs each.
+def _part_of(thread: str) -> int:
+    """Where in the list the files stand that a thread of that name enters: those of the request's own threads, of what
+    computes for it, of jobs."""
+    return 2 if thread == JOBS else int(thread.endswith(" calls"))
 
-    `warm`: after the same errand on the other clutch. `but`: names of threads that do no part of the errand, such as the one
-    that looks for jobs from time to time.
+
+def entered(errand: Callable[[TestClient, str], None], *, warm: bool = True, jobs: bool = False) -> list[str]:
+    """The files of this process that an errand enters, by kinds of threads (`_part_of`) and the order in which each enters
+    them, on one of two clutches of some stationary runs each.
+
+    `warm`: after the same errand on the other clutch. `jobs`: a job is a part of the errand.
     """
-    files, watched, folders = dict[str, None](), False, tuple(f"{ROOT / folder}/" for folder in COUNTED)
+    by_part: dict[int, dict[str, None]] = defaultdict(dict)
+    but = BESIDE if jobs else BESIDE | {JOBS}
+    watched, folders = False, tuple(f"{ROOT / folder}/" for folder in COUNTED)
 
     def watch(frame: FrameType, event: str, _: object) -> None:
         """The hook: Python calls it at every call and return."""
         if not watched or event != "call" or not frame.f_code.co_filename.startswith(folders):
             return
-        if threading.current_thread().name not in but:
-            files[frame.f_code.co_filename] = None
+        if (thread := threading.current_thread().name) not in but:
+            by_part[_part_of(thread)][frame.f_code.co_filename] = None
 
     before, before_threads = sys.getprofile(), threading.getprofile()
     threading.setprofile(watch)  # before the service's threads start
@@ -57,6 +73,7 @@ def entered(errand: Callable[[TestClient, str], None], *, warm: bool = True, but
     finally:
         sys.setprofile(before)
         threading.setprofile(before_threads)
+    files = dict.fromkeys(name for part in sorted(by_part) for name in by_part[part])
     return [Path(name).relative_to(ROOT).as_posix() for name in files]
 
 
@@ -72,5 +89,6 @@ def get_life(http: TestClient, clutch_id: str) -> None:
 
 def diagnose(http: TestClient, clutch_id: str) -> None:
     """Until the report is there, which is computed in another process."""
-    asked = {"json": {"adopt": False}, "headers": {"Prefer": "wait=120"}}
-    http.post(f"/v1/clutches/{clutch_id}/diagnoses", **asked).raise_for_status()
+    asked = {"json": {"adopt": False}, "headers": {"Prefer": f"wait={LONGEST_WAIT_SECONDS}"}}
+    answer = http.post(f"/v1/clutches/{clutch_id}/diagnoses", **asked).raise_for_status()
+    assert answer.json()["status"] == "finished", answer.text

@@ -1,6 +1,9 @@
 """Alarms: rules, what they have raised, receivers, and what these were sent."""
 
+import asyncio
+from concurrent.futures import ThreadPoolExecutor
 from functools import partial
+from threading import BoundedSemaphore
 from typing import Annotated, Literal
 
 from fastapi import APIRouter, Query, Request
@@ -13,6 +16,7 @@ from service.answers import alarms
 from service.api import alarm as api
 from service.api.base import IDENTIFIER_PATTERN, LONGEST_IDENTIFIER
 from service.changes import change_alarms
+from service.errors import BusyError
 from service.web import auth
 from service.web.context import Context
 from service.web.problems import CHANGING, READING, SENDING
@@ -23,6 +27,10 @@ webhook_router = APIRouter(prefix="/v1/webhooks", tags=["alarms"])
 
 #: [s] That a test waits for its deliveries. Chosen: a little longer than one attempt may take.
 _TEST_SECONDS = 12.0
+#: Addresses of receivers that are looked at together, in threads of their own: a name may take half a minute to resolve, and
+#: so may Apprise. The threads that other requests need are not held meanwhile. Chosen: nobody adds receivers faster.
+_AT_ONCE = 4
+_LOOKING, _FREE = ThreadPoolExecutor(_AT_ONCE, thread_name_prefix="addresses"), BoundedSemaphore(_AT_ONCE)
 
 AlarmId = Annotated[str, Field(description="The rule's name")]
 EventId = Annotated[str, Field(description="The alarm's name")]
@@ -137,7 +145,11 @@ async def post_webhook(request: Request, context: auth.Admin) -> Response:
     private = await run_in_threadpool(
         change_alarms.inside_allowed, context.database, context.settings.private_receivers
     )
-    await run_in_threadpool(require_address, receiver.url, private=private)
+    if not _FREE.acquire(blocking=False):
+        raise BusyError("the addresses of other receivers are being looked at: try again later")
+    looking = _LOOKING.submit(require_address, receiver.url, private=private)
+    looking.add_done_callback(lambda _: _FREE.release())
+    await asyncio.wrap_future(looking)
     by = auth.grant_of(request).name
     row = await run_in_threadpool(change_alarms.add_receiver, context.database, receiver, by=by, at=now())
     new_secret = None if receiver.secret else row.secret

@@ -22,10 +22,12 @@ import re
 import sqlite3
 import threading
 import time
+import weakref
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, closing, contextmanager, suppress
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from sqlalchemy import Connection, Engine, create_engine, event
 from sqlalchemy.exc import DBAPIError
@@ -149,10 +151,32 @@ def read_only(path: Path) -> str:
     return f"{path.absolute().as_uri()}?mode=ro"
 
 
-def connect_shared(path: Path, lock_timeout: float, *, writable: bool) -> sqlite3.Connection:
+class _Connection(sqlite3.Connection):
+    """A connection that can end the statements which nobody has read to their end.
+
+    SQLite keeps the state of the database that such a statement began to read, beyond the end of its transaction: the
+    next transaction of the connection would read old rows. An error in the middle of a result leaves one for as long as
+    anything holds the error.
+    """
+
+    def __init__(self, *arguments: Any, **options: Any) -> None:
+        super().__init__(*arguments, **options)
+        self._cursors: weakref.WeakSet[sqlite3.Cursor] = weakref.WeakSet()
+
+    def cursor(self, *arguments: Any, **options: Any) -> Any:
+        cursor = super().cursor(*arguments, **options)
+        self._cursors.add(cursor)
+        return cursor
+
+    def end_statements(self) -> None:
+        while self._cursors:
+            self._cursors.pop().close()
+
+
+def connect_shared(path: Path, lock_timeout: float, *, writable: bool) -> _Connection:
     """A connection of the driver that threads may share. Its transactions begin by statements alone."""
     address, uri = (str(path), False) if writable else (read_only(path), True)
-    return sqlite3.connect(address, uri=uri, timeout=lock_timeout, isolation_level=None, check_same_thread=False)
+    return _Connection(address, uri=uri, timeout=lock_timeout, isolation_level=None, check_same_thread=False)
 
 
 def make_engine(
@@ -163,6 +187,10 @@ def make_engine(
     # No upper bound: a connection is cheap, and the threads that use one are bounded elsewhere.
     pool = {"poolclass": QueuePool, "pool_size": 8, "max_overflow": -1} if pooled else {"poolclass": NullPool}
     engine = create_engine("sqlite+pysqlite://", creator=connect, **pool)
+
+    @event.listens_for(engine, "reset")
+    def end_statements(connection: _Connection, *_: object) -> None:
+        connection.end_statements()
 
     @event.listens_for(engine, "connect")
     def prepare(connection: sqlite3.Connection, _: ConnectionPoolEntry) -> None:

@@ -100,6 +100,26 @@ def test_an_attempt_that_ends_while_the_outbox_is_read_is_followed_by_a_pause(
     assert (looks[0], stored(client)[0]["attempts"], len(receiver.requests)) == ("stale", 1, 1)
 
 
+def test_an_attempt_whose_end_is_not_stored_is_made_again_after_its_pause(
+    client: TestClient, receiver: Receiver, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It was made again after a minute."""
+    store, failed = outbox._store, threading.Event()
+
+    def fail_once(*arguments: Any) -> Any:
+        if not failed.is_set():
+            failed.set()
+            raise OSError("the lock could not be taken")
+        return store(*arguments)
+
+    monkeypatch.setattr(outbox, "_store", fail_once)
+    monkeypatch.setattr(outbox, "LEASE_SECONDS", 1e9)
+    raised(client)
+    receiver.await_requests(1)
+    receiver.status = 200
+    until(lambda: [item["state"] for item in stored(client)] == ["delivered"])
+
+
 def test_a_clock_set_back_by_a_day_delays_nothing(client: TestClient, receiver: Receiver) -> None:
     """What was to be tried in a second was tried a day and a second later."""
     raised(client)

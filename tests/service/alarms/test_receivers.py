@@ -6,8 +6,11 @@ import socket
 import socketserver
 import subprocess
 import sys
+import threading
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -154,6 +157,27 @@ def test_what_is_no_address_is_refused(client: TestClient) -> None:
     for url in NO_ADDRESSES:
         answer = client.post("/v1/webhooks", json={"url": url})
         assert (answer.status_code, answer.json()["errors"][0]["pointer"]) == (422, "/url"), url
+
+
+def test_names_that_do_not_resolve_hold_up_nobody_else(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Forty such requests held all threads, and nobody was answered who needed one."""
+    ended, resolve = threading.Event(), socket.getaddrinfo
+
+    def hanging(host: str, *arguments: Any, **more: Any) -> Any:
+        if host == "slow.example.org":
+            ended.wait(60)
+            raise socket.gaierror
+        return resolve(host, *arguments, **more)
+
+    monkeypatch.setattr(socket, "getaddrinfo", hanging)
+    with ThreadPoolExecutor(44) as pool:
+        asked = [pool.submit(client.post, "/v1/webhooks", json={"url": "http://slow.example.org/"}) for _ in range(44)]
+        until(lambda: sum(answer.done() for answer in asked) == 40)
+        assert client.get("/v1/webhooks").json()["items"] == []
+        ended.set()
+        statuses = Counter(answer.result().status_code for answer in asked)
+    assert statuses == {201: 4, 503: 40}
+    assert all(answer.result().headers["Retry-After"] for answer in asked if answer.result().status_code == 503)
 
 
 @pytest.mark.parametrize(

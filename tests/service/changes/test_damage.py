@@ -40,24 +40,17 @@ def damage(path: Path, statement: str) -> None:
 def answers(client: TestClient) -> list[Any]:
     """What is said of the clutch after its next test, without what says when."""
     receipt = post_run(client, NEXT)
+    (listed,) = client.get("/v1/clutches?find=c1").json()["items"]
     remaining = client.get("/v1/clutches/c1/remaining-useful-life").json()
     del receipt["received_at"], remaining["revision"]
-    return [receipt, remaining]
-
-
-def listed(path: Path) -> list[Any]:
-    """What a service that starts now lists of the clutch."""
-    with client_on(f"sqlite:///{path}") as client:
-        (item,) = client.get("/v1/clutches?find=c1").json()["items"]
-    return [item["summary"], item["state"]]
+    return [receipt, remaining, listed["summary"], listed["state"]]
 
 
 @pytest.fixture(scope="module")
 def intact(stored: Path, tmp_path_factory: pytest.TempPathFactory) -> list[Any]:
-    path = Path(shutil.copy(stored, tmp_path_factory.mktemp("intact") / "copy.db"))
+    path = shutil.copy(stored, tmp_path_factory.mktemp("intact") / "copy.db")
     with client_on(f"sqlite:///{path}") as client:
-        answered = answers(client)
-    return [*answered, *listed(path)]
+        return answers(client)
 
 
 #: What follows from runs, and how it is damaged.
@@ -68,6 +61,9 @@ RESULTS = {
     "a digit of a summary": "UPDATE clutch SET summary = replace(summary, 'at_least\":', 'at_least\":9')"
     " WHERE clutch_id = 'c1'",
     "a summary cut off": "UPDATE clutch SET summary = substr(summary, 1, 20) WHERE clutch_id = 'c1'",
+    "a mean COF": "UPDATE fit SET mean_cof = 1.01 * mean_cof WHERE run_key = 2",
+    "a receipt": "UPDATE run SET receipt = replace(receipt, 'mean_cof\":0', 'mean_cof\":1') WHERE clutch_id = 'c1'"
+    " AND run_id = 'r2000'",
     "the last prediction": "UPDATE prediction SET payload = '{}' WHERE clutch_id = 'c1' AND cycles = 4000",
 }
 
@@ -83,8 +79,7 @@ def test_a_damaged_result_is_computed_again_before_the_next_test_is_tracked(
     assert "10 runs of 2 clutches were checked" in said
     assert "c2" not in said
     with client_on(f"sqlite:///{path}") as client:
-        answered = answers(client)
-    assert [*answered, *listed(path)] == intact
+        assert answers(client) == intact
     assert any("again from its runs" in record.getMessage() for record in caplog.records)
     assert "0 findings" in clutchlife("verify", "--database", f"sqlite:///{path}")
 
@@ -135,6 +130,32 @@ def test_a_replay_mends_results_and_leaves_what_was_sent(path: Path) -> None:
     damage(path, "UPDATE run SET cycles = cycles + 1 WHERE clutch_id = 'c1' AND run_id = 'r2000'")
     assert "c1: not replayed" in clutchlife("replay", "c1", "--database", url, code=1)
     assert "c1: run (run_key 3) is not what was stored" in clutchlife("verify", "--database", url, code=1)
+
+
+@pytest.mark.parametrize(
+    "column", ["state = 'withdrawn'", "state = 'held'", "details = replace(details, 'origin', 'x')"]
+)
+def test_what_nobody_said_of_a_run_is_never_taken_for_what_was_decided(path: Path, column: str) -> None:
+    """A run whose state was damaged counted no more, and a replay gave it the checksum of that state."""
+    url = f"sqlite:///{path}"
+    damage(path, f"UPDATE run SET {column} WHERE clutch_id = 'c1' AND run_id = 'r2000'")  # noqa: S608  (our own words)
+    with client_on(url) as client:
+        refused = client.post("/v1/clutches/c1/runs", json=NEXT)
+        assert (refused.status_code, refused.json()["type"]) == (503, "urn:clutchlife:problem:damaged")
+        assert post_run(client, NEXT, "c2")["state"] == "accepted"
+    assert "c1: not replayed" in clutchlife("replay", "c1", "--database", url, code=1)
+    assert "c1: run (run_key 3) is not what was stored" in clutchlife("verify", "--database", url, code=1)
+
+
+def test_a_run_that_somebody_withdrew_stays_so_where_its_receipt_is_damaged(path: Path) -> None:
+    url, run = f"sqlite:///{path}", "/v1/clutches/c1/runs/r2000"
+    with client_on(url) as client:
+        assert client.post(f"{run}/withdraw", json={"reason": "no oil"}).status_code == 200
+    damage(path, RESULTS["a receipt"])
+    with client_on(url) as client:
+        assert post_run(client, NEXT)["state"] == "accepted"
+        assert client.get(run).json()["state"] == "withdrawn"
+    assert "0 findings" in clutchlife("verify", "--database", url)
 
 
 def test_a_damaged_rule_of_alarms_keeps_no_run_out_and_is_found(path: Path) -> None:

@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 from fastapi.testclient import TestClient
 
+from service.paging import to_cursor
 from tests.service.clients import filled_client, post_run
 from tests.service.web.routes.granting import granted
 from tests.support import stationary
@@ -75,6 +76,17 @@ def test_a_limit_is_refused_where_nothing_is_listed_and_a_cursor_that_is_none_ev
     assert listed.get(f"{BASE}/model?limit=1").status_code == 422
     for name in TABLES:
         assert listed.get(f"{BASE}/{name.partition('?')[0]}.csv?cursor=bad").status_code == 422, name
+
+
+@pytest.mark.parametrize("number", [1e300, 2.0**63, 2.0**53 + 2, 2.0**53, -5.0, -1e300])
+def test_no_number_of_a_cursor_is_too_great_for_the_database(listed: TestClient, number: float) -> None:
+    """A list of clutches at 2^63 was answered 500."""
+    cursor = to_cursor((number, "c1"))
+    expected = 200 if abs(number) <= 2.0**53 else 422
+    of_clutch = [f"{BASE}/{name}?" for name in LISTS]
+    of_all = [f"/v1/clutches?sort={sort}&" for sort in ("worst", "name", "kind")]
+    for address in (*of_clutch, *of_all, "/v1/alarms/events?", "/v1/jobs?", "/v1/rigs?", "/v1/webhooks?"):
+        assert listed.get(f"{address}cursor={cursor}").status_code == expected, address
 
 
 # --- Lists of clutches.

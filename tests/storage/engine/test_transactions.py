@@ -34,6 +34,22 @@ def test_a_failed_statement_rolls_back_what_came_before(database: Database) -> N
         assert clutches.get(connection, CLUTCH) == clutch_row()
 
 
+def test_an_error_in_the_middle_of_a_result_leaves_no_later_transaction_in_the_past(database: Database) -> None:
+    """What holds the error held the rest of the result, and with it the state of the database that the connection read."""
+    write_to(database, clutches.insert, clutch_row("another"))
+
+    def fail() -> None:
+        with database.reading() as connection:
+            rows = connection.exec_driver_sql("SELECT clutch_id FROM clutch")
+            raise LookupError(rows.fetchone())
+
+    with pytest.raises(LookupError) as held:
+        fail()
+    write_to(database, clutches.bump_revision, CLUTCH)
+    assert read_from(database, clutches.revisions)[CLUTCH] == 1
+    assert held.value is not None
+
+
 def test_threads_take_turns_and_readers_never_see_half_a_run(database: Database) -> None:
     done = threading.Event()
 
