@@ -18,6 +18,7 @@
 # make law     diagnoses campaigns whose friction curve is not eq. 3 (measured curves of ../shared, eq. 3 with a share of their
 #              misfit, other formulas): a table of docs/appendix/diagnosis.md; goes on where it ended with STORE=FILE
 #              (SEED= SIZE=small|full ONLY= ARGS=--write)
+# make law_adoption  adopts what the diagnosis offers of such campaigns and holds remaining life against the truth (the same)
 # make oracle  of campaigns in which the diagnosis fell short, how many one could name who knows the forms; reads what
 #              `make blind` stored                                                         (the same SEED= SIZE= ONLY=)
 # make visible hides effects at twice the amplitude that a report calls visible, and counts alarms (SEED= COUNT= STORE=)
