@@ -13,6 +13,7 @@ Source: M. C. Kennedy and A. O'Hagan, Bayesian calibration of computer models, J
 and the envelope are those of measured friction curves (docs/appendix/diagnosis.md).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
@@ -55,6 +56,19 @@ class LawSizes(NamedTuple):
 EXACT = LawSizes(0.0, 0.0, 0.0)
 
 
+class _Same:
+    """Values that are equal only to themselves: what is kept of them is found without comparing them."""
+
+    def __init__(self, values: FloatArray) -> None:
+        self.values = values
+
+    def __hash__(self) -> int:
+        return id(self.values)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Same) and self.values is other.values
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LawForm:
     """The functions of which δ is a sum, on the ranges that a campaign measured."""
@@ -79,12 +93,13 @@ class LawForm:
 
     def shares(self, velocity: FloatArray, pressure: FloatArray, cycles: FloatArray) -> FloatArray:
         """∂δ/∂coefficient [n, k] at velocity [n] m/s, pressure [n] Pa and cycles [n]."""
-        speed, high, gone = self._units(velocity, pressure, cycles)
-        form = self._form(speed)
+        moved, high, gone = self._places(_Same(pressure), _Same(cycles))
+        form = self._form(self._speed(velocity, moved))
         over_pressure = _waves(high, self._of_pressure, _LAW_LENGTH)[:, 1:]
         over_life = _waves(gone, self._of_life, _LAW_LENGTH)[:, 1:]
         changing = form[:, : _CHANGING + 1]
-        blocks = [form, *(changing * factor[:, None] for factor in self._factors(high, gone))]
+        factors = [*self._pressure_factors(high), *([_CHANGES * gone] if self._of_life else [])]
+        blocks = [form, *(changing * factor[:, None] for factor in factors)]
         return np.concatenate([*blocks, over_pressure, over_life], axis=1)
 
     def share(
@@ -92,36 +107,44 @@ class LawForm:
     ) -> FloatArray:
         """δ [n] for coefficients [k]: as `shares` has it, by tables of its functions (error below 0.2 % of the highest
         wave)."""
-        units, tables = self._units(velocity, pressure, cycles), self._tables(coefficients.tobytes())
-        over_speed, over_pressure, over_life = tables
-        speed, high, gone = units
-        share = np.interp(high, _NODES, over_pressure) + np.interp(gone, _NODES, over_life)
-        factors = [np.ones_like(speed), *self._factors(high, gone)]
-        for factor, part in zip(factors, over_speed, strict=True):
-            share += factor * np.interp(speed, _NODES, part)
-        return np.asarray(share, dtype=np.float64)
+        known = coefficients.tobytes()
+        moved, alone, factors = self._beside_speed(known, _Same(pressure), _Same(cycles))
+        over_speed = _between(self._tables(known)[0], self._speed(velocity, moved))
+        return np.asarray(alone + np.einsum("nk,nk->n", over_speed, factors), dtype=np.float64)
 
-    def _units(
-        self, velocity: FloatArray, pressure: FloatArray, cycles: FloatArray
+    @lru_cache(maxsize=8)  # noqa: B019 - as below
+    def _beside_speed(
+        self, coefficients: bytes, pressure: "_Same", cycles: "_Same"
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Places [n] within 0 ... 1 along ln v, pressure and √life."""
-        high = (pressure - self.lowest) / max(self.highest - self.lowest, 1e-300)
+        """By what share of itself velocity [n] moves, f + g [n], and by what each function of speed is multiplied [n, m]:
+        h by 1, h' by its waves over pressure, h'' by the life."""
+        moved, high, gone = self._places(pressure, cycles)
+        _, over_pressure, over_life = self._tables(coefficients)
+        of_pressure = _between(over_pressure, high)
+        by_life = [_CHANGES * gone] if self._of_life else []
+        factors = np.stack([np.ones_like(gone), *of_pressure[:, 1:].T, *by_life], axis=1)
+        return moved, of_pressure[:, 0] + _at(gone, over_life), factors
+
+    @lru_cache(maxsize=8)  # noqa: B019 - the few points of a campaign, at which effects are tried over and over
+    def _places(self, pressure: "_Same", cycles: "_Same") -> tuple[FloatArray, FloatArray, FloatArray]:
+        """By what share of itself velocity [n] moves, and places [n] within 0 ... 1 along pressure and √life."""
+        high = (pressure.values - self.lowest) / max(self.highest - self.lowest, 1e-300)
         high = np.clip((high + MARGIN) / (1.0 + 2.0 * MARGIN), 0.0, 1.0)
-        gone = np.sqrt(np.clip((cycles - self.first) / max(self.last - self.first, 1.0), 0.0, 1.0))
-        moved = _at(high, self.moved_by_pressure) + _at(gone, self.moved_by_life)
-        moving = np.clip(velocity * np.exp(-moved), self.slowest, self.fastest)
-        speed = np.log(moving / self.slowest) / self._width
-        return speed, high, gone
+        gone = np.sqrt(np.clip((cycles.values - self.first) / max(self.last - self.first, 1.0), 0.0, 1.0))
+        return np.exp(-_at(high, self.moved_by_pressure) - _at(gone, self.moved_by_life)), high, gone
+
+    def _speed(self, velocity: FloatArray, moved: FloatArray) -> FloatArray:
+        """Places [n] within 0 ... 1 along ln v."""
+        return np.log(np.clip(velocity * moved, self.slowest, self.fastest) / self.slowest) / self._width
 
     def _form(self, speed: FloatArray) -> FloatArray:
         """h's waves [n, 1 + _SPEEDS] with the envelope."""
         envelope = np.exp(_ENVELOPE * self._width * (1.0 - speed))
         return _waves(speed, _SPEEDS, _LENGTH / self._width) * envelope[:, None]
 
-    def _factors(self, high: FloatArray, gone: FloatArray) -> list[FloatArray]:
-        """With what the form changes [n] each: waves over pressure, and life."""
-        waves = _waves(high, self._of_pressure, _LAW_LENGTH)[:, 1 : 1 + _CHANGING_PRESSURES]
-        return [_CHANGES * factor for factor in (*waves.T, *((gone,) if self._of_life else ()))]
+    def _pressure_factors(self, high: FloatArray) -> FloatArray:
+        """The waves over pressure [m, n] with which the form changes."""
+        return np.asarray(_CHANGES * _waves(high, self._of_pressure, _LAW_LENGTH)[:, 1 : 1 + _CHANGING_PRESSURES].T)
 
     @property
     def _width(self) -> float:
@@ -129,8 +152,8 @@ class LawForm:
         return max(float(np.log(self.fastest / self.slowest)), 1e-3)
 
     @lru_cache(maxsize=8)  # noqa: B019 - a few forms, and small tables
-    def _tables(self, coefficients: bytes) -> tuple[list[FloatArray], FloatArray, FloatArray]:
-        """At the nodes: the functions of speed that `_factors` multiply (the first alone), f and g."""
+    def _tables(self, coefficients: bytes) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Columns at the nodes: h, what changes with each wave over pressure and with life; f and those waves; g."""
         known = np.frombuffer(coefficients)
         form, at = self._form(_NODES), _SPEEDS + 1
         over_speed = [form @ known[:at]]
@@ -139,7 +162,8 @@ class LawForm:
             at += _CHANGING + 1
         over_pressure = _waves(_NODES, self._of_pressure, _LAW_LENGTH)[:, 1:] @ known[at : at + self._of_pressure]
         over_life = _waves(_NODES, self._of_life, _LAW_LENGTH)[:, 1:] @ known[at + self._of_pressure :]
-        return over_speed, over_pressure, over_life
+        with_pressure = [over_pressure, *self._pressure_factors(_NODES)]
+        return np.stack(over_speed, axis=1), np.stack(with_pressure, axis=1), over_life
 
     @property
     def _of_pressure(self) -> int:
@@ -162,7 +186,15 @@ class LearnedLaw:
         return self.form.share(self.coefficients, velocity, pressure, cycles)
 
 
-def _at(unit: FloatArray, nodes: tuple[float, ...]) -> FloatArray:
+def _between(table: FloatArray, unit: FloatArray) -> FloatArray:
+    """Columns [n, m] of a table at the nodes, linear between them."""
+    place = unit * (_NODES.size - 1)
+    before = np.minimum(place.astype(np.intp), _NODES.size - 2)
+    left = (place - before)[:, None]
+    return np.asarray(table[before] * (1.0 - left) + table[before + 1] * left)
+
+
+def _at(unit: FloatArray, nodes: Sequence[float] | FloatArray) -> FloatArray:
     """What even nodes over 0 ... 1 have there [n]."""
     return np.interp(unit, np.linspace(0.0, 1.0, len(nodes)), nodes)
 
