@@ -160,19 +160,25 @@ def _offsets(facts: Facts, growing: Sequence[Shape]) -> tuple[Tried, ...]:
     return tuple(tried)
 
 
-def _pressure_offset_change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
-    course, value, log_power = shape
-    cycles = scene.points.cycles
-    if course == OFFSET_CONSTANT:
-        share = np.ones_like(cycles)
-    elif course == OFFSET_STEP:
-        share = np.where(cycles > value, 1.0, 0.0)
-    else:
-        life = scene.life
-        share = life ** math.exp(log_power) if course == OFFSET_GROWING else flattening(life, value)
-    pressed = np.maximum(scene.points.pressure + amplitude * share, 0.0)  # nothing pulls the plates apart
+def _pressure_offset_changes(scene: Scene, settings: Sequence[tuple[float, Shape]]) -> FloatArray:
     as_read = scene.curve_at(pressure=scene.points.pressure)  # by the same law below the lowest level
-    return np.asarray(scene.curve_at(pressure=pressed) - as_read, dtype=np.float64)
+    changes = np.empty((as_read.size, len(settings)))
+    for place, (amplitude, shape) in enumerate(settings):
+        offset = amplitude * _pressure_offset_share(scene, shape)
+        pressed = np.maximum(scene.points.pressure + offset, 0.0)  # nothing pulls the plates apart
+        changes[:, place] = scene.curve_at(pressure=pressed) - as_read
+    return changes
+
+
+def _pressure_offset_share(scene: Scene, shape: Shape) -> FloatArray:
+    """The share [P] of its size that the offset has."""
+    course, value, log_power = shape
+    if course == OFFSET_CONSTANT:
+        return np.ones_like(scene.points.cycles)
+    if course == OFFSET_STEP:
+        return np.where(scene.points.cycles > value, 1.0, 0.0)
+    life = scene.life
+    return np.asarray(life ** math.exp(log_power) if course == OFFSET_GROWING else flattening(life, value))
 
 
 PRESSURE_OFFSET = Effect(
@@ -201,7 +207,8 @@ PRESSURE_OFFSET = Effect(
     ),
     grid=_pressure_offset_grid,
     courses=_pressure_offset_courses,
-    change=_pressure_offset_change,
+    change=lambda scene, amplitude, shape: _pressure_offset_changes(scene, [(amplitude, shape)])[:, 0],
+    several=_pressure_offset_changes,
     grows_with=Measure.PRESSURE,
     before_lag=True,
     discrepancies=(Discrepancy.LIFE,),

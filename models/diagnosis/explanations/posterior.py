@@ -8,8 +8,9 @@ records. Their probabilities sum to one, and a verdict is read off them alone.
 
 The search begins with each single cause that is promised to be more probable than nothing, and goes up, best first: what
 the linear screen about a refitted alternative promises of one thing more is refitted, while it could hold more than
-NEGLIGIBLE of the posterior; the promise errs by a share SLACK of the leader's lead, and a single cause that is further
-behind than that is not screened, unless nothing with a name leads. Then down: the leader without each of
+NEGLIGIBLE of the posterior; the promise errs by a share SLACK of what the leader explains more than the alternative about
+which it was made, and a single cause that is further behind the leader than that is not screened, unless nothing with a
+name leads. Then down: the leader without each of
 its parts, from where it has the rest. Structure is refitted as an effect is, its likeliest form taken off: judged linearly
 it looked 7.5 nats strong where it was a false lead. It draws no random numbers.
 
@@ -262,7 +263,7 @@ class Search:
             if near:
                 self._screen(near)
                 continue
-            hopes = {key: self._hope(key, leader, slack) for key in self._promises}
+            hopes = {key: self._hope(key, leader, criteria.SLACK) for key in self._promises}
             enough = log_sum(list(weights.values())) + np.log(criteria.NEGLIGIBLE)
             able = [key for key in hopes if hopes[key] >= enough]
             if not able:  # structure leads causes only once one of them was refitted
@@ -278,8 +279,11 @@ class Search:
         for key, (promise, _, _) in sorted(self._promises.items(), key=lambda item: item[1][0]):
             if len(key[0].causes) == 1 and not key[0].unknown and promise > self.null.log_evidence:
                 best[key[0]] = key
-        for key in best.values():
-            self._take(key)
+        for key in sorted(best.values(), key=lambda key: -self._promises[key][0]):
+            weights = [nodes[0].log_evidence + self.prior(alternative) for alternative, nodes in self.nodes.items()]
+            lead = max(weights) - self.null.log_evidence
+            if self._promises[key][0] + criteria.SLACK * lead >= max(weights) + np.log(criteria.NEGLIGIBLE):
+                self._take(key)
 
     def _screen(self, alternatives: set[Alternative]) -> None:
         """What smooth structure and the catalogue promise beside single causes, or nothing, that were refitted."""
@@ -304,12 +308,16 @@ class Search:
             self._failed.add(key[0])
 
     def _hope(self, key: Key, leader: Alternative, slack: float) -> float:
-        """A promise, less what refits of the same alternative fell short of theirs, and the slack where it explains what the
-        leader does in another way."""
-        alternative = key[0]
-        short = [n.log_evidence + self.prior(alternative) - n.promise for n in self.nodes.get(alternative, [])]
+        """A promise, with what refits of other kinds of the alternative brought beyond theirs or fell short of them; where
+        none was refitted yet and it explains what the leader does in another way, with a share `slack` of what the leader
+        explains more than the parent about which it was promised."""
+        alternative, (promise, parent, _) = key[0], self._promises[key]
+        beyond = [n.log_evidence + self.prior(alternative) - n.promise for n in self.nodes.get(alternative, [])]
+        if beyond:
+            return promise + max(beyond)
         adds_to_leader = set(leader.causes) <= set(alternative.causes) and leader.unknown in {"", alternative.unknown}
-        return self._promises[key][0] + min(short, default=0.0) + (0.0 if adds_to_leader else slack)
+        more = max(self.nodes[leader][0].log_evidence - parent.log_evidence, 0.0)
+        return promise + (0.0 if adds_to_leader else slack * more)
 
     def _down(self, leader: Alternative) -> None:
         """The leader with one thing less, from where it has the rest."""
