@@ -279,11 +279,8 @@ class Search:
         for key, (promise, _, _) in sorted(self._promises.items(), key=lambda item: item[1][0]):
             if len(key[0].causes) == 1 and not key[0].unknown and promise > self.null.log_evidence:
                 best[key[0]] = key
-        for key in sorted(best.values(), key=lambda key: -self._promises[key][0]):
-            weights = [nodes[0].log_evidence + self.prior(alternative) for alternative, nodes in self.nodes.items()]
-            lead = max(weights) - self.null.log_evidence
-            if self._promises[key][0] + criteria.SLACK * lead >= max(weights) + np.log(criteria.NEGLIGIBLE):
-                self._take(key)
+        for key in best.values():
+            self._take(key)
 
     def _screen(self, alternatives: set[Alternative]) -> None:
         """What smooth structure and the catalogue promise beside single causes, or nothing, that were refitted."""

@@ -71,7 +71,7 @@ def warmth(friction: FloatArray, velocity: FloatArray, cycles: float, clock: Flo
 
 def heated(at: Where) -> FloatArray:
     bare = torque(at.velocity, at.parameters)
-    return bare * np.expm1(-LOSS * warmth(bare, at.velocity, at.cycles, at.clock))
+    return bare * np.expm1(np.log1p(-LOSS) * warmth(bare, at.velocity, at.cycles, at.clock))
 
 
 def with_plate(given: Campaign, rise: float, offset: float = 0.0) -> Campaign:
@@ -147,7 +147,7 @@ def test_with_the_channel_it_goes_with_the_plate_and_a_thermometers_offset_is_no
         scene = scene_of(with_plate(campaign(1), RISE, offset))
         assert len(INTERFACE_HEATING.grid(scene.facts)) == 4
         change = INTERFACE_HEATING.change(scene, 0.1, (0.0, WHOLE, 0.0))
-        lost = -np.log1p(change / scene.curve) / 0.1
+        lost = np.log1p(change / scene.curve) / np.log1p(-0.1)
         area = GEOMETRY.friction_faces * GEOMETRY.lining_area
         at_rest, per_flux = scene.facts.plate_warming
         assert at_rest == pytest.approx(offset, abs=1.5)
