@@ -18,6 +18,7 @@ import sys
 import tempfile
 from collections.abc import Mapping
 from dataclasses import asdict
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, BinaryIO, Literal
@@ -31,6 +32,7 @@ from service.readers.confinement import close_files, close_network_and_processes
 from service.readers.detect import Format, is_packed, opened, overdue, too_slow
 from service.readers.limits import Limits
 from service.readers.preview import preview
+from service.readers.suggest import Proposal, propose
 from service.readers.table import ColumnChoice, Reading
 
 #: The module that reads each format, the package it needs, and the extra of ours that installs it ("": always there).
@@ -44,7 +46,7 @@ READERS = {
 }
 
 #: What is asked of a file.
-Answer = Literal["channels", "preview"]
+Answer = Literal["channels", "preview", "suggestion"]
 #: Bytes of the line of JSON that the reading process answers with.
 _LONGEST_ANSWER = 1 << 20
 _BLOCK = 1 << 20
@@ -60,8 +62,11 @@ _MAX_OPEN_FILES = 64
 _ENVIRONMENT = ("PATH", "PYTHONPATH", "LANG", "LC_ALL", "LD_LIBRARY_PATH", "XDG_CACHE_HOME", "MPLCONFIGDIR")
 
 
-def read_isolated(kind: Format, path: Path, answer: Answer, *, reading: Reading, limits: Limits) -> Any:
-    """The channels [n] of a file in their own units (`channels.Channels`), or its preview, read in a process of its own.
+def read_isolated(
+    kind: Format, path: Path, answer: Answer, *, reading: Reading, limits: Limits, filename: str = ""
+) -> Any:
+    """The channels [n] of a file in their own units (`channels.Channels`), its preview or a suggestion, read in a process of
+    its own.
 
     What is unpacked is kept beside the file meanwhile.
     Raises InvalidError where the file cannot be read, or makes its reader crash or take too long; TooLargeError where it
@@ -71,12 +76,12 @@ def read_isolated(kind: Format, path: Path, answer: Answer, *, reading: Reading,
     if missing := not_installed(kind, f"this service cannot read {kind} files"):
         raise BusyError(missing, errors=[FieldError(pointer="", code="format_not_installed", message=missing)])
     if not is_packed(path):
-        return _run(kind, path, answer, reading, limits)
+        return _run(kind, path, answer, reading, limits, filename)
     with opened(path, limits) as source, tempfile.NamedTemporaryFile(dir=path.parent) as plain:
         while block := source.read(_BLOCK):
             plain.write(block)
         plain.flush()
-        return _run(kind, Path(plain.name), answer, reading, limits)
+        return _run(kind, Path(plain.name), answer, reading, limits, filename)
 
 
 def not_installed(kind: Format, consequence: str) -> str | None:
@@ -88,10 +93,11 @@ def not_installed(kind: Format, consequence: str) -> str | None:
     return f"{consequence}, because a library is missing. To install it where the service runs: {command}"
 
 
-def _run(kind: Format, path: Path, answer: Answer, reading: Reading, limits: Limits) -> Any:
+def _run(kind: Format, path: Path, answer: Answer, reading: Reading, limits: Limits, filename: str) -> Any:
     request = {
         "kind": kind,
         "path": str(path.resolve()),
+        "filename": filename,
         "answer": answer,
         "reading": asdict(reading),
         "limits": asdict(limits),
@@ -163,6 +169,13 @@ def _answer(result: BinaryIO, kind: Format, wanted: str, limits: Limits) -> Any:
             raise _error(answer["error"])
         if wanted == "preview":
             return dict(answer["preview"])
+        if wanted == "suggestion":
+            held = answer["suggestion"]
+            return held and Proposal(
+                reading=_reading(held["reading"]),
+                confidence=float(held["confidence"]),
+                titles=tuple(map(str, held["titles"])),
+            )
         lengths = {str(name): int(length) for name, length in answer["channels"].items()}
         notices = tuple(Notice(code=str(item["code"]), message=str(item["message"])) for item in answer["notices"])
         counts = bool(answer["counts"])
@@ -178,6 +191,12 @@ def _answer(result: BinaryIO, kind: Format, wanted: str, limits: Limits) -> Any:
     return Channels(columns=columns, notices=notices, counts=counts, labels=labels)
 
 
+def _reading(held: Mapping[str, Any]) -> Reading:
+    """A reading as JSON has it."""
+    mapping = {name: ColumnChoice(**choice) for name, choice in held["mapping"].items()}
+    return Reading(**{**held, "mapping": mapping, "left_out": list(held["left_out"])})
+
+
 def _error(answer: Mapping[str, Any]) -> ServiceError:
     error_type = TooLargeError if answer["too_large"] else InvalidError
     errors = [FieldError(**error) for error in answer["errors"]]
@@ -191,8 +210,7 @@ def main() -> None:
     """Read the file that standard input names; write the answer to the open file whose number is the first argument."""
     request = json.load(sys.stdin)
     kind, path, limits = Format(request["kind"]), Path(request["path"]), Limits(**request["limits"])
-    mapping = {name: ColumnChoice(**choice) for name, choice in request["reading"]["mapping"].items()}
-    reading = Reading(**request["reading"] | {"mapping": mapping})
+    reading = _reading(request["reading"])
     with os.fdopen(int(sys.argv[1]), "wb") as result:
         # whatever it loads, and asks of the system, before the doors close
         reader = importlib.import_module(READERS[kind][0])
@@ -202,11 +220,14 @@ def main() -> None:
         result.write(_STARTED)
         result.flush()
         try:
-            table = reader.read_table(path, reading, limits)
-            if request["answer"] == "preview":
-                _write(result, {"preview": preview(table, reading)})
+            read_table = partial(reader.read_table, path, limits=limits)
+            if request["answer"] == "suggestion":
+                proposed = propose(read_table, reading, limits, request["filename"])
+                _write(result, {"suggestion": proposed and asdict(proposed)})
+            elif request["answer"] == "preview":
+                _write(result, {"preview": preview(read_table(reading), reading)})
             else:
-                _write_channels(result, to_channels(table, reading, limits))
+                _write_channels(result, to_channels(read_table(reading), reading, limits))
         except ServiceError as error:
             _write_error(result, error)
         except MemoryError:

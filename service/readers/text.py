@@ -44,8 +44,10 @@ _BLOCK = 1 << 17
 _COMMENTS = ("#", "%", "//")
 _NEWLINE, _COMMA = b"\n,"
 _SEPARATOR_LINE = re.compile(r"\s*sep=(.?)\s*", re.IGNORECASE)
-#: Encodings that are tried where text is not UTF-8; of those that read as many titles the first.
-_ENCODINGS = ("cp1252", "cp1250", "cp1254", "gb18030", "shift_jis", "euc_jp", "big5", "euc_kr", "cp1251")
+#: The encoding of text that is not UTF-8; and others that are tried for titles that the caller names, or for a suggestion:
+#: of those that read as many titles the first.
+_WESTERN = ("cp1252",)
+_OTHERS = ("cp1250", "cp1254", "gb18030", "shift_jis", "euc_jp", "big5", "euc_kr", "cp1251")
 #: Pairs of bytes as Chinese text has them, and single ones as Western text has them.
 _CHINESE = re.compile(rb"(?:[\x00-\x7f]|[\xa1-\xf7][\xa1-\xfe])*")
 #: Cells of which the last is in quotes and goes on; a quotation mark within a cell is no other (3/4").
@@ -76,8 +78,9 @@ class _Form:
         return self.lines[self.layout.start] if self.layout.start < len(self.lines) else self.lines[-1] + 1
 
 
-def read_text(opened: Open, reading: Reading, limits: Limits) -> Table:
-    """The table of a text. Raises InvalidError where it has no titles, or its lines are no text."""
+def read_text(opened: Open, reading: Reading, limits: Limits, *, any_encoding: bool = False) -> Table:
+    """The table of a text, which is UTF-8, UTF-16 or Western, or of another encoding if the caller names its titles or takes
+    `any_encoding`. Raises InvalidError where it has no titles, or its lines are no text."""
     with opened() as source:
         first = source.read(_BLOCK)
     whole = len(first) < _BLOCK
@@ -87,7 +90,7 @@ def read_text(opened: Open, reading: Reading, limits: Limits) -> Table:
         rule = "is empty, and so is the rest of the file: send a file with a header and rows of numbers"
         raise wrong_line(1, rule, "no_header")
     try:
-        form = _form(first, reading, limits)
+        form = _form(first, reading, limits, any_encoding=any_encoding or bool(named_columns(reading)))
     except InvalidError:
         if (on_its_side := _turned(first, reading)) is None:
             raise
@@ -177,13 +180,14 @@ def _zeros_amid(line: int, tail: str) -> InvalidError:
     return wrong_line(line, rule, "not_text")
 
 
-def _encodings(head: bytes) -> list[str]:
+def _encodings(head: bytes, *, any_encoding: bool) -> list[str]:
     """The encodings that a text may be in, likeliest first."""
     if wide := utf_16(head):
         return [wide]
     if _decodes(head, "utf-8"):
         return ["utf-8"]
-    encodings = [name for name in _ENCODINGS if _decodes(head, name)] or ["latin-1"]
+    tried = (*_WESTERN, *_OTHERS) if any_encoding else _WESTERN
+    encodings = [name for name in tried if _decodes(head, name)] or ["latin-1"]
     return sorted(encodings, key=lambda name: name != "gb18030") if _CHINESE.fullmatch(head) else encodings
 
 
@@ -198,12 +202,12 @@ def _decodes(head: bytes, encoding: str) -> bool:
 # --- lines -> the table ---
 
 
-def _form(first: bytes, reading: Reading, limits: Limits) -> _Form:
+def _form(first: bytes, reading: Reading, limits: Limits, *, any_encoding: bool) -> _Form:
     """The encoding, the separator and the table by which most titles are known."""
     best: _Form | None = None
     named = named_columns(reading)
     unfit: list[list[str]] = []
-    for encoding in _encodings(first):
+    for encoding in _encodings(first, any_encoding=any_encoding):
         text = _lines(first, encoding)[: reading.skip_rows + MAX_ROWS]
         for separator in _separators(text[reading.skip_rows :]):
             numbered = [*_rows(text, separator, reading.skip_rows)]
@@ -230,7 +234,7 @@ def _lines(block: bytes, encoding: str) -> list[str]:
 
 def _turned(first: bytes, reading: Reading) -> bytes | None:
     """A whole text whose lines are channels with its lines as columns, by the separator by which it is a table then."""
-    text = _lines(first, _encodings(first)[0])[reading.skip_rows :]
+    text = _lines(first, _encodings(first, any_encoding=False)[0])[reading.skip_rows :]
     for separator in _separators(text):
         rows = [cells for _, cells, _ in _rows(text, separator) if any(cells)]
         if on_its_side := turned(rows, named_columns(reading)):
