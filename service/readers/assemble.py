@@ -148,6 +148,7 @@ def _clocks(
     named = {at: column.index for column in taken for at in column.clock_of}
     times = {at: clock for at, clock in all_times.items() if at not in named.values()} or all_times
     clocks: dict[int, Clock | None] = {}
+    coarse: dict[int, bool] = {}
     for index in (column.index for column in taken if column.channel != "time_s"):
         recorder = columns[index].clock
         if index in named or (recorder is not None and recorder.own):
@@ -156,8 +157,13 @@ def _clocks(
         of_group = [at for at in times if columns[at].group == columns[index].group]
         if of_group:
             chosen = max((at for at in of_group if at < index), default=of_group[0])
-            coarse = np.unique(values[chosen]).size < values[chosen].size
-            finer = recorder if recorder is not None and coarse and _agree(recorder.read(), values[chosen]) else None
+            if recorder is not None and chosen not in coarse:
+                coarse[chosen] = _repeats(values[chosen])
+            finer = (
+                recorder
+                if recorder is not None and coarse[chosen] and _agree(recorder.read(), values[chosen])
+                else None
+            )
             clocks[index] = finer or times[chosen]
         else:
             clocks[index] = recorder or (next(iter(times.values())) if len(times) == 1 else None)
@@ -192,6 +198,12 @@ def as_seconds(column: FileColumn, values: NDArray[Any]) -> FloatArray:
         return np.asarray((values - values[:1]) / _SECOND, dtype=np.float64)
     converted = conversion("time_s", column.unit or "s")
     return plain(values) * (1.0 if converted is None else converted.factor)
+
+
+def _repeats(times: FloatArray) -> bool:
+    """Whether any time stands in more than one row."""
+    steps = np.diff(times)
+    return not (steps > 0).all() and np.unique(times).size < times.size
 
 
 def _refuse_passed_over(column: FileColumn, seconds: FloatArray, clocks: Mapping[int, Clock | None]) -> None:
@@ -314,6 +326,8 @@ def _drop_empty_rows(name: str, own: _Series, table: Table, leave_out: bool) -> 
     `leave_out`: rows with any other empty cell are left out; else InvalidError is raised on them.
     """
     missing, invalid = np.isnan(own.values), own.valid
+    if table.line_of is None and not leave_out and not missing.any():
+        return own
     if table.line_of is not None and not leave_out:
         own.valid = None  # a cell's mask says that it is empty
     if own.times is not None and own.times.size == missing.size and not missing.all():
