@@ -90,18 +90,34 @@ def _numbers(
     least, most = int(behind.min()), int(behind.max())
     if before.max() > _DIGITS or most - 1 > _DIGITS or ((before == 0) & (behind <= 1)).any():
         return None
-    whole = _value(words[points] & _MASKS[before]).astype(np.float64)
-    if most <= 1:  # no digit behind any point
-        values = whole
+    if least == most and before.max() + most <= _DIGITS:
+        values = _together(words[ends], before, most)
+    elif most <= 1:  # no digit behind any point
+        values = _value(words[points] & _MASKS[before]).astype(np.float64)
     else:
         decimals = most - 1 if least == most else np.maximum(behind - 1, 0)
         power = _POWERS[decimals]
-        values = whole * power + _value(words[ends] & _MASKS[decimals])
+        values = _value(words[points] & _MASKS[before]).astype(np.float64) * power + _value(
+            words[ends] & _MASKS[decimals]
+        )
         if before.max() + most - 1 >= _DIGITS_EXACT and values.max() >= _MOST_EXACT:
             return None
         values /= power
     if negative is not None:
         np.negative(values, out=values, where=negative)
+    return np.asarray(values, dtype=np.float64)
+
+
+def _together(last: _Words, before: NDArray[np.intp], behind: int) -> FloatArray:
+    """Cells of at most eight bytes, all with the same number of characters `behind`, the point among them: the digits before
+    it are moved onto it."""
+    decimals = max(behind - 1, 0)
+    if behind:
+        fraction = _MASKS[decimals] * np.uint64(0x11)  # all of a byte
+        last = (last & fraction) | ((last << np.uint64(8)) & ~fraction)
+    values = _value(last & _MASKS[before + decimals]).astype(np.float64)
+    if decimals:
+        values /= _POWERS[decimals]
     return np.asarray(values, dtype=np.float64)
 
 

@@ -7,6 +7,7 @@ and with how it ended. It ends when the socket does.
 
 import atexit
 import contextlib
+import gc
 import json
 import os
 import signal
@@ -126,6 +127,7 @@ def serve(control: socket.socket, load: Callable[[Any], None], read: Callable[[A
             message += control.recv(_LONGEST_REQUEST)
         request = json.loads(message)
         load(request)
+        gc.freeze()  # what is loaded is shared with children: their collector must not touch it
         child = os.fork()
         if child == 0:
             control.close()

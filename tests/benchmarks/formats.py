@@ -1,4 +1,5 @@
-"""A record read by the service's readers, beside the library of its format alone: time, and memory beyond the library's.
+"""A record read by the service's readers, beside the library of its format alone: time by the clock, time of the processor,
+which others at work do not lengthen as much, and memory beyond the library's.
 
 Each is measured in a process of its own, which reads once before: `python -m tests.benchmarks.formats FORMAT own|ours FILE`.
 """
@@ -13,7 +14,7 @@ import warnings
 from collections.abc import Callable
 from pathlib import Path
 
-from tests.benchmarks.memory import added
+from tests.benchmarks.memory import added, family_seconds
 from tests.benchmarks.records import write_records
 from tests.measuring import show
 
@@ -35,6 +36,7 @@ def formats() -> None:
                 for who, held in found.items():
                     held.append(_measured(name, who, paths[name]))
             own, ours = (min(one["seconds"] for one in found[who]) for who in ("own", "ours"))
+            worked = [min(one["worked"] for one in found[who]) for who in ("ours", "own")]
             more = min(one["bytes"] for one in found["ours"]) - min(one["bytes"] for one in found["own"])
             rows.append(
                 {
@@ -42,6 +44,7 @@ def formats() -> None:
                     "its library, s": f"{own:.3f}",
                     "ours, s": f"{ours:.3f}",
                     "times": f"{ours / own:.1f}",
+                    "times of the processor": f"{worked[0] / worked[1]:.1f}",
                     "wanted": f"≤ {wanted:g}",
                     "memory beyond it, MiB": f"{more / 2**20:.0f}",
                     "wanted, MiB": f"≤ {WANTED_MB}",
@@ -80,13 +83,15 @@ def main() -> None:
     warnings.simplefilter("ignore")
     name, who, path = sys.argv[1:]
     read = _reader(name, who, Path(path))
+    read()
     grown = added(os.getpid(), read)
-    seconds = []
+    seconds, before = [], family_seconds(os.getpid())
     for _ in range(_TIMES):
         begun = time.perf_counter()
         read()
         seconds.append(time.perf_counter() - begun)
-    print(json.dumps({"seconds": min(seconds), "bytes": grown}))
+    worked = (family_seconds(os.getpid()) - before) / _TIMES
+    print(json.dumps({"seconds": min(seconds), "worked": worked, "bytes": grown}))
 
 
 if __name__ == "__main__":
