@@ -19,17 +19,18 @@ from service.readers.column_names import choices_of, like_a_time
 from service.readers.constants import stacked_columns, value_within
 from service.readers.limits import Limits
 from service.readers.long_table import widened
-from service.readers.meanings import MEANS, Sense, has_noun, is_another, is_short_for, meaning, measures, words
+from service.readers.meanings import MEANS, SYMBOLS, Sense, has_noun, is_another, is_short_for, meaning, measures, words
 from service.readers.numerals import is_stamp, plain, read_cells
 from service.readers.table import COLUMNS, NO_TIME, SHEETS, ColumnChoice, FileColumn, Reading, Table, labels, marks
-from service.readers.unit_table import conversion
+from service.readers.unit_table import conversion, is_unit
 
 #: The channels that every test needs.
 _NEEDED = ("torque_nm", "speed_rpm", "pressure_bar")
 #: How sure a column's name makes of its channel. Chosen; by a draw of files (tests/lab/files).
 _SURE = {Sense.WHOLE: 1.0, Sense.FOREIGN: 0.98, Sense.PART: 0.8}
-#: The same of a name that says nothing: short for the channel, with a unit of it; a unit alone; short, without a unit.
-_SHORT_IN_UNIT, _UNIT_ALONE, _SHORT_ALONE = 0.75, 0.6, 0.4
+#: The same of a name that says nothing: short for the channel, with a unit of it; a unit alone; short, or with a letter for
+#: it (`T_clutch`), without a unit.
+_SHORT_IN_UNIT, _UNIT_ALONE, _SHORT_ALONE, _SYMBOL_ALONE = 0.75, 0.6, 0.4, 0.3
 #: A rival that is so likely beside the best column makes this of its confidence. Chosen.
 _RIVAL, _WITH_RIVAL = 0.8, 0.6
 #: What is left of the confidence after each thing that only its values suggest. Chosen.
@@ -140,6 +141,8 @@ def _title(column: FileColumn) -> str:
 def _likelihood(column: FileColumn, channel: str) -> float:
     """How probable it is by its name and its unit that a column holds a channel."""
     of, sense = meaning(column.name, column.unit)
+    if column.unit is None and _ends_in_another_unit(channel, column.name):
+        return 0.0
     if of is None and column.unit is None:  # what it may be, if it is in the channel's unit
         assumed = meaning(column.name, CHANNELS[channel].unit)
         if has_noun(channel, column.name) or is_short_for(channel, column.name):
@@ -150,8 +153,22 @@ def _likelihood(column: FileColumn, channel: str) -> float:
     score = _SURE.get(sense, 0.0) if of == channel else 0.0
     if of != channel and channel in _NEEDED and sense is Sense.UNKNOWN:
         short = is_short_for(channel, column.name)
-        score = (_SHORT_IN_UNIT if short else _UNIT_ALONE) if fits else _SHORT_ALONE if short else 0.0
+        symbol = any(channel in SYMBOLS.get(word, ()) for word in words(column.name))
+        alone = _SHORT_ALONE if short else _SYMBOL_ALONE if symbol else 0.0
+        score = (_SHORT_IN_UNIT if short else _UNIT_ALONE) if fits else alone
     return score * (0.6 if MEANS & {*words(column.name)} else 1.0)
+
+
+def _ends_in_another_unit(channel: str, name: str) -> bool:
+    """Whether the last word of a name is a unit of something else (`Axial_Force_kN`)."""
+    *others, last = re.split(r"[\s_]+", name.strip())
+    return bool(others) and is_unit(last) and _unit_at_the_end(channel, name) is None
+
+
+def _unit_at_the_end(channel: str, name: str) -> str | None:
+    """A unit of a channel that is the last word of a name, whatever its capitals (`pressure_mpa`)."""
+    *others, last = re.split(r"[\s_]+", name.strip())
+    return next((unit for unit in (last, last.upper()) if others and conversion(channel, unit)), None)
 
 
 def _best(scores: Mapping[int, float]) -> tuple[int | None, float]:
@@ -171,6 +188,8 @@ def _choice(table: Table, at: int, channel: str, reading: Reading) -> tuple[Colu
         return ColumnChoice(column=title), 1.0
     if channel == "time_s" and any(is_stamp(row[at]) for row in table.head[:1] if len(row) > at):
         return ColumnChoice(column=title), 1.0
+    if unit := _unit_at_the_end(channel, column.name):
+        return ColumnChoice(column=title, unit=unit), _UNIT_BY_SIZE
     values = plain(read_cells(table, {at: channel}, reading)[at])
     return ColumnChoice(column=title, unit=_unit_by_size(channel, values)), _UNIT_BY_SIZE
 

@@ -296,7 +296,7 @@ def _layout(
     for place, at in enumerate(above):
         for titles in _titles(rows, above[place:], width, data):
             filled = sum(map(bool, titles))
-            channel_count = recognised(titles, named)
+            channel_count = 0 if _are_units(titles) else recognised(titles, named)  # `rpm` is both
             enough = filled >= width if at in comments else filled >= min(2, width) or channel_count
             rank = (
                 channel_count,

@@ -102,7 +102,8 @@ class RefusedError(ClutchlifeError):
 def suggested(suggestion: dict[str, Any]) -> str:
     """A suggestion in a line: its columns, clock, run and first row."""
     parts = [f"{channel} from {title}" for channel, title in suggestion["map"].items()]
-    parts += [f"{name} {suggestion[name]}" for name in _SUGGESTED if suggestion.get(name) not in (None, "")]
+    stated = {name: suggestion[name] for name in _SUGGESTED if suggestion.get(name) not in (None, "")}
+    parts += [f"{name} {value:g}" if isinstance(value, float) else f"{name} {value}" for name, value in stated.items()]
     first = ", ".join(f"{name} {value:.6g}" for name, value in (suggestion["rows"] or [{}])[0].items())
     return f"suggested ({suggestion['confidence']:.0%}): {', '.join(parts)}; first row: {first}"
 

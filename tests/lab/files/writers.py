@@ -21,15 +21,6 @@ from nptdms import ChannelObject, TdmsWriter  # type: ignore[import-untyped]
 
 from models.arrays import FloatArray
 
-#: Factor from the channel's unit (bar, rpm, Nm, °C, s) to another.
-TO_UNIT = {
-    "bar": 1.0, "kPa": 100.0, "MPa": 0.1, "psi": 14.503773773, "mbar": 1000.0, "N/mm²": 0.1, "kgf/cm2": 1.0197162129779283,
-    "rpm": 1.0, "1/min": 1.0, "min-1": 1.0, "U/min": 1.0, "r/min": 1.0, "rad/s": 2 * np.pi / 60, "tr/min": 1.0, "giri/min":
-    1.0, "Nm": 1.0, "N·m": 1.0, "N.m": 1.0, "N m": 1.0, "N-m": 1.0, "kNm": 1e-3, "lbf·ft": 0.7375621493, "lb-ft":
-    0.7375621493, "kgf·m": 1 / 9.80665, "s": 1.0, "sec": 1.0, "ms": 1000.0, "min": 1 / 60, "°C": 1.0, "degC": 1.0, "deg C":
-    1.0, "C": 1.0,
-}  # fmt: skip
-
 
 @dataclass(frozen=True, kw_only=True)
 class Column:
@@ -65,6 +56,8 @@ class Sheet:
 
 #: Language -> what rigs call their channels, their `units`, and what stands `beside` them.
 TITLES = tomllib.loads(Path(__file__).with_name("titles.toml").read_text(encoding="utf-8"))
+#: Factors from the channels' units (bar, rpm, Nm, °C, s) to others; 1 where there is none.
+FACTORS: dict[str, float] = TITLES.pop("factors")
 
 
 # --- tests ---
@@ -104,7 +97,7 @@ def columns_of(
     columns = []
     for channel, values in channels.items():
         unit = str(rng.choice(TITLES[language]["units"][channel])) if units or rng.random() < 0.3 else None
-        written = values * TO_UNIT[unit] if unit else values
+        written = values * FACTORS.get(unit, 1.0) if unit else values
         name = str(rng.choice(TITLES[language][channel]))
         columns.append(Column(name=name, unit=unit, values=written.tolist(), channel=channel))
     size = len(columns[0].values)

@@ -20,12 +20,12 @@ from service.cli import answers, options
 from service.cli.clutches import _row
 from service.cli.export import TABLES
 from service.cli.options import EX_DATAERR, fail, out, print_line
-from service.cli.sending import push
+from service.cli.sending import delivery, push
 from service.cli.workbook import write_workbook
 from service.client.clutchlife import Client
 from tests.service.clients import clutchlife, post_run
 from tests.service.web.routes.surfaces import png, sha256
-from tests.service.web.test_import_preview import german
+from tests.service.web.test_import_preview import foreign, german
 from tests.support import free_port, post_tests, stationary
 
 Terminal = Callable[..., str]
@@ -160,6 +160,19 @@ def test_only_a_first_file_is_asked_about(terminal: Terminal, client: TestClient
         (7000, "Stat_7000.csv", "bench-3"),
         (8000, "Stat_8000.csv", "bench-3"),
     ]
+
+
+def test_a_push_of_unknown_titles_shows_what_is_suggested(
+    terminal: Terminal, client: TestClient, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(delivery, "connect", lambda *_, **__: nullcontext(client))
+    file = tmp_path / "KL-4712_01500.csv"
+    file.write_bytes(foreign())
+    given = ("--clutch", "c1", "--kind", "stationary_stribeck", "--cycles", "1500", "--spool", tmp_path / "spool")
+    shown = terminal("push", file, *given, code=EX_DATAERR)
+    assert "suggested (80%): torque_nm from Couple FZG" in shown
+    assert "first row: pressure_bar 5, speed_rpm 20, torque_nm 20.48" in shown
+    assert client.get("/v1/clutches/c1/runs").json()["items"] == []
 
 
 def test_a_pushed_file_is_the_same_run_when_imported(terminal: Terminal, client: TestClient, tmp_path: Path) -> None:
