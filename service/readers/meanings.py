@@ -6,17 +6,18 @@ Words of other languages (`other_names.toml`) and names that are known in part o
 import re
 import tomllib
 import unicodedata
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from enum import Enum
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
 
 from service.channels import CHANNELS
 from service.readers.limits import LONGEST_NAME
 from service.readers.unit_table import conversion
 
-_TABLES = [
+#: Section -> kind of words -> words.
+_Words = Mapping[str, Mapping[str, Sequence[str]]]
+_TABLES: list[_Words] = [
     tomllib.loads(Path(__file__).with_name(name).read_text(encoding="utf-8"))
     for name in ("names.toml", "other_names.toml")
 ]
@@ -24,12 +25,12 @@ _NAMES = _TABLES[0]
 _QUANTITY_NAMES = [name for name in _NAMES if name not in ("words", "run")]
 
 
-def _of(section: str, kind: str, tables: list[dict[str, Any]] = _TABLES) -> list[str]:
+def _of(section: str, kind: str, tables: Sequence[_Words] = _TABLES) -> list[str]:
     """The words of a kind, of both tables."""
     return [word for table in tables for word in table.get(section, {}).get(kind, ())]
 
 
-def _every(table: dict[str, Any]) -> set[str]:
+def _every(table: _Words) -> set[str]:
     return {word.strip("-") for section in table.values() for words in section.values() for word in words}
 
 
