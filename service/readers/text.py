@@ -40,8 +40,8 @@ from service.readers.table_finder import (
     turned,
 )
 
-#: Bytes of the beginning, which must hold the titles; and of a block of rows. Chosen: rows that are no plain numbers take 60
-#: times as much memory; a quarter of the block takes 1.2 times as long.
+#: Bytes of the beginning, which must hold the titles, and of a piece of rows that are no plain numbers, which take 60 times
+#: as much memory; and of a block of rows. Chosen: a quarter of it takes 1.2 times as long.
 _HEAD, _BLOCK = 1 << 17, 1 << 19
 #: Rows that are looked at at once for the decimal sign. Chosen: the first one mostly shows it.
 _SETTLED = 64
@@ -370,16 +370,10 @@ class _DataBody:
                 line = self._line + block.count("\n") - 1
                 message = f"left out: {zeros} zero bytes after line {line}, as a logger leaves where power was lost"
                 self.data.notices.append(Notice(code="lines_left_out", message=message))
-            columns = None if dated else self._plain(block, channels)
-            if columns is None:
-                columns = self._careful(block, channels, last)
-                self._line += block.count("\n")
-            else:
-                self._lines.append((self.rows, range(self._line, self._line + columns[0].size)))
-                self._line += columns[0].size
-            for part, column in zip(parts, columns, strict=True):
-                part.append(column)
-            self.rows += columns[0].size
+            for columns in self._columns(block, channels, last=last, dated=dated):
+                for part, column in zip(parts, columns, strict=True):
+                    part.append(column)
+                self.rows += columns[0].size
             if self.rows > most:
                 rule = f"must not have more than {most} rows"
                 raise TooLargeError(f"a file of {len(channels)} channels {rule}: send it in parts")
@@ -390,6 +384,23 @@ class _DataBody:
             masked = any(isinstance(values, np.ma.MaskedArray) for values in part)
             joined.append((np.ma.concatenate if masked else np.concatenate)(part))
         return joined
+
+    def _columns(
+        self, block: str, channels: Mapping[int, str], *, last: bool, dated: bool
+    ) -> Iterator[list[NDArray[Any]]]:
+        """The columns of a block of plain numbers, or of each piece of any other one."""
+        columns = None if dated else self._plain(block, channels)
+        if columns is not None:
+            self._lines.append((self.rows, range(self._line, self._line + columns[0].size)))
+            self._line += columns[0].size
+            yield columns
+            return
+        start = 0
+        while start < len(block):
+            end = len(block) if '"' in block else block.find("\n", min(start + _HEAD, len(block) - 1)) + 1
+            piece, start = block[start:end], end
+            yield self._careful(piece, channels, last and end == len(block))
+            self._line += piece.count("\n")
 
     def _blocks(self) -> Iterator[_Block]:
         """The blocks from the first row of data on."""
