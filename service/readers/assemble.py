@@ -132,7 +132,9 @@ def _chosen_table(columns: dict[str, FloatArray], table: Table, reading: Reading
     tables = [f"{table.name}/{number}" if table.name else str(number) for number in range(1, len(starts))]
     if table.breaks and time_s is not None and reading.table not in tables:
         steps = np.diff(time_s)
-        if all(0 < steps[row - 1] < _LONGEST_PAUSE * np.median(steps) for row in table.breaks):
+        # rows that are left out may leave fewer than stood above a title
+        within = all(0 < row <= steps.size for row in table.breaks)
+        if within and all(0 < steps[row - 1] < _LONGEST_PAUSE * np.median(steps) for row in table.breaks):
             return columns, 0
     asked_table = reading.table if table.breaks and reading.table != table.name else ""
     number = index_of_wanted(tables, asked_table, "table")
