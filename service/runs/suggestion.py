@@ -12,7 +12,7 @@ from models.records.cleaning import UnusableRecordError
 from models.records.plateaus import cut_plateaus
 from service.api.rig import ChannelName, FileKindName, RigColumn, RigIn, RigProfile, Suggestion
 from service.clutch.incoming_run import SampledChannels
-from service.errors import InvalidError
+from service.errors import InvalidError, ServiceError
 from service.readers.assemble import Channels
 from service.readers.read_file import read_file, suggest_file
 from service.readers.table import ColumnChoice, Reading
@@ -35,15 +35,13 @@ def suggestion_of(
 ) -> Suggestion | None:
     """How a file may be read; None where nothing is found that gives a test. `beside`: names of files that came with it;
     `why`: what keeps it from being read.
-
-    Raises TooLargeError or BusyError as reading does.
     """
     try:
         proposal = suggest_file(path, filename=filename, reading=reading)
         if proposal is None:
             return None
         read = read_file(path, filename=filename, reading=proposal.reading)
-    except InvalidError:  # it is damaged, or no table: the refusal itself says so
+    except ServiceError:  # damaged, too large, no table, or busy: the refusal itself stands
         return None
     reading = proposal.reading
     said = suggested(filename, beside, read.labels)
