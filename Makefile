@@ -19,6 +19,8 @@
 #              misfit, other formulas): a table of docs/appendix/diagnosis.md; goes on where it ended with STORE=FILE
 #              (SEED= SIZE=small|full ONLY= ARGS=--write)
 # make law_adoption  adopts what the diagnosis offers of such campaigns and holds remaining life against the truth (the same)
+# make files   a draw of files as rigs, loggers and spreadsheets write them: how many are read, suggested, asked for, or wrong: the
+#              table of docs/appendix/benchmarks.md                                       (ARGS="--seed 63 --size 100 --each")
 # make oracle  of campaigns in which the diagnosis fell short, how many one could name who knows the forms; reads what
 #              `make blind` stored                                                         (the same SEED= SIZE= ONLY=)
 # make visible hides effects at twice the amplitude that a report calls visible, and counts alarms (SEED= COUNT= STORE=)
@@ -67,7 +69,7 @@ SLIM := $(LOCK) $(foreach name,$(UNUSED),--no-emit-package $(name))
 # what the first run of the tests compiles, the next ones read: a third of what `make quick` takes
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help compiled docs gallery reference adoption law_adoption demo shell test quick slow faults check check-python check-javascript lowest benchmark load scale real figures architecture blind law oracle visible mutants plausibility score rivals picture lock clean
+.PHONY: files help compiled docs gallery reference adoption law_adoption demo shell test quick slow faults check check-python check-javascript lowest benchmark load scale real figures architecture blind law oracle visible mutants plausibility score rivals picture lock clean
 .DELETE_ON_ERROR:
 
 # the demo's pages link to /help: where it cannot be built, as without the internet, its page says so
@@ -129,6 +131,9 @@ picture: $(VENV)/.tests
 
 benchmark: $(VENV)/.tests
 	$(BIN)/python -m tests.benchmarks $(ARGS)
+
+files: $(VENV)/.tests
+	$(BIN)/python -W ignore -m tests.lab.files $(ARGS)
 
 load: $(VENV)/.tests
 	$(BIN)/python -m tests.load $(ARGS)

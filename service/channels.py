@@ -156,6 +156,8 @@ def _numbers(name: str, values: Sequence[Any], errors: _Errors) -> FloatArray | 
 def _check_range(name: str, column: FloatArray, errors: _Errors, *, sampled: bool) -> None:
     channel = CHANNELS[name]
     least = SAMPLED_LEAST.get(name, channel.least) if sampled else channel.least
+    if least <= column.min(initial=least) and column.max(initial=least) <= channel.most:
+        return  # what is not a number is neither
     good = (column >= least) & (column <= channel.most)
     wrong = np.flatnonzero(~good)
     errors.total += max(0, wrong.size - MAX_ERRORS)

@@ -49,7 +49,10 @@ class ServiceError(Exception):
 
 
 class InvalidError(ServiceError, status=422, slug="invalid-content", title="The content is not valid"):
-    """The request is understood and its content is wrong."""
+    """The request is understood and its content is wrong. `suggestion`: of a file that is not read without a question, what
+    may be meant."""
+
+    suggestion: object = None
 
     @classmethod
     def of(

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, get_args
 
@@ -14,7 +15,17 @@ from models.records.plateaus import cut_plateaus
 from models.records.pressure_levels import pressure_stretches
 from service import repository
 from service.api.clutch import ClutchIn
-from service.api.rig import FileKindName, Preview, PreviewColumn, PreviewPiece, RigColumn, RigOut, RigPage, RigProfile
+from service.api.rig import (
+    FileKindName,
+    Preview,
+    PreviewColumn,
+    PreviewPiece,
+    RigColumn,
+    RigOut,
+    RigPage,
+    RigProfile,
+    SuggestedRun,
+)
 from service.api.run import Fit, Warned
 from service.channels import CHANNELS, RADIANS_PER_SECOND_PER_RPM, bar
 from service.clutch.analysis import analyse
@@ -25,7 +36,9 @@ from service.paging import Part, by_name
 from service.readers.read_file import preview_file, read_file
 from service.readers.table import Reading
 from service.readers.unit_table import spellings
+from service.runs.file_names import Suggested, suggested
 from service.runs.rig_profile import Named, fits, named, pattern_for
+from service.runs.suggestion import suggestion_of
 from service.runs.upload import NEEDED, reading_with, run_of
 from storage import clutches, rigs
 from storage.engine.database import Database
@@ -49,6 +62,12 @@ def rig_profile(database: Database, name: str) -> RigOut:
         return repository.rig(connection, name)
 
 
+def is_saved(database: Database, name: str) -> bool:
+    """Whether there is a profile of this name."""
+    with database.reading() as connection:
+        return rigs.get(connection, name) is not None
+
+
 def preview(
     database: Database,
     path: Path,
@@ -60,9 +79,11 @@ def preview(
     cycles: float | None,
     clutch_id: str | None,
     reading: Reading,
+    beside: Sequence[str] = (),
 ) -> Preview:
-    """What would be made of a file by `profile`, by that of `rig`, or by the one whose columns it has; else by its titles.
-    What `reading` says of columns, decimal sign and missing values comes before either.
+    """What would be made of a file by `profile`, by that of `rig`, or by the one whose columns it has; else by its titles,
+    and where these do not say all, by a suggestion. What `reading` says of columns, decimal sign and missing values comes
+    before either. `beside`: names of files that came with it.
 
     `clutch_id`: the clutch whose geometry and torque filter evaluate it, where it is registered already. Raises InvalidError
     or TooLargeError where no table is found, NotFoundError where the rig is unknown.
@@ -75,17 +96,24 @@ def preview(
         rig, profile = _fitting(database, shown, filename)
         shown = preview_file(path, filename=filename, reading=reading_with(profile, reading)) if profile else shown
     from_profile = Named() if profile is None else named(profile, filename, shown["labels"])
-    used = _by_titles(shown) if profile is None else profile
-    if used is not None:
-        stated = {name: value for name in ("decimal", "missing", "good") if (value := getattr(reading, name))}
-        used = used.model_copy(update=stated)
-        if reading.mapping and (titled := _by_titles(shown)):
-            of_file = [column for column in titled.columns if not column.title.startswith("=")]
-            used = used.model_copy(update={"columns": of_file + _stated_without_column(reading)})
+    said = suggested(filename, beside, shown["labels"])
+    used = _with_stated(_by_titles(shown) if profile is None else profile, shown, reading)
     kind, cycles = kind or from_profile.kind, from_profile.cycles if cycles is None else cycles
     by_titles = profile is None and shown["problem"] is None  # as a push reads it; else with what is open left open
-    read_by = reading_with(None if by_titles else used, reading if by_titles else Reading())
-    evaluated = _evaluated(path, filename, None if used is None else read_by, kind, geometry, torque_filter)
+    read_by = reading_with(None if by_titles else used, reading if by_titles else Reading(time=reading.time))
+    evaluate = partial(_evaluated, path, filename, geometry=geometry, torque_filter=torque_filter)
+    evaluated = evaluate(None if used is None else read_by, kind)
+    suggestion = None
+    lacking = f"no column is known as {', '.join(evaluated.missing)}" if evaluated.missing else ""
+    if profile is None and (why := shown["problem"] or evaluated.problem or lacking):
+        suggestion = suggestion_of(
+            path, filename=filename, reading=reading, kind=kind, cycles=cycles, beside=beside, why=why
+        )
+    if suggestion is not None:
+        used = suggestion.profile
+        read_by = replace(reading_with(used, reading), time=suggestion.time)
+        shown = preview_file(path, filename=filename, reading=read_by)
+        evaluated = evaluate(read_by, kind or suggestion.kind)
     kind = kind or (evaluated.kinds[0] if len(evaluated.kinds) == 1 else None)
     usable = _first_of_each(shown["columns"])
     columns = [_column(shown["columns"][index], used) for index in usable]
@@ -103,12 +131,27 @@ def preview(
         first_rows=[[row[index] if index < len(row) else "" for index in usable] for row in shown["head"]],
         units={name: spellings(name).split(", ") for name in CHANNELS},
         rig=rig,
-        profile=_saveable([column.title for column in columns], used, kind, filename, cycles),
+        profile=_saveable([column.title for column in columns], used, kind, filename, cycles, said),
         kind=kind,
         cycles=cycles,
         run_id=from_profile.run_id,
+        clutch_id=from_profile.clutch_id,
+        suggested_run=SuggestedRun(kind=said.named.kind, cycles=said.named.cycles, clutch_id=said.named.clutch_id),
+        suggestion=suggestion,
         **vars(evaluated) | {"missing": missing},
     )
+
+
+def _with_stated(used: RigProfile | None, shown: Mapping[str, Any], reading: Reading) -> RigProfile | None:
+    """A profile with what the request says besides: marks, the decimal sign, its map."""
+    if used is None:
+        return None
+    stated = {name: value for name in ("decimal", "missing", "good") if (value := getattr(reading, name))}
+    used = used.model_copy(update=stated)
+    if reading.mapping and (titled := _by_titles(shown)):
+        of_file = [column for column in titled.columns if not column.title.startswith("=")]
+        used = used.model_copy(update={"columns": of_file + _stated_without_column(reading)})
+    return used
 
 
 def _clutch(database: Database, clutch_id: str | None) -> tuple[Geometry, float]:
@@ -175,26 +218,32 @@ def _column(column: Mapping[str, Any], profile: RigProfile | None) -> PreviewCol
         stated_unit=column["unit"],
         unit=column["read_in"] if channel == column["channel"] else None,
         channel=channel,
-        in_part=channel is not None and column["in_part"],
         scale=1.0 if profile_column is None else profile_column.scale,
         offset=0.0 if profile_column is None else profile_column.offset,
     )
 
 
 def _saveable(
-    titles: Sequence[str], used: RigProfile | None, kind: FileKindName | None, filename: str, cycles: float | None
+    titles: Sequence[str],
+    used: RigProfile | None,
+    kind: FileKindName | None,
+    filename: str,
+    cycles: float | None,
+    said: Suggested,
 ) -> RigProfile:
-    """The profile as it could be saved: with all columns, and a pattern of the file's name where the cycles are in that."""
+    """The profile as it could be saved: with all columns, and what finds cycles and clutch: a pattern of the file's name, or
+    labels above the table."""
     profile_columns = {column.title: RigColumn(**dict(column)) for column in used.columns} if used else {}
     profile_fields = {} if used is None else dict(used)
-    suggested = {
-        "file_name": profile_fields.get("file_name") or pattern_for(filename, cycles),
-        "kind": profile_fields.get("kind") or kind,
-    }
+    in_cell = said.cycles_cell is not None and cycles in (None, said.named.cycles)
+    pattern = said.file_name if cycles is None else pattern_for(filename, cycles, said.named.clutch_id)
+    found = {"kind": kind, "cycles_cell": said.cycles_cell if in_cell else None, "clutch_cell": said.clutch_cell}
+    found["file_name"] = pattern
+    own = {name: profile_fields.get(name) or value for name, value in found.items()}
     of_file = [title for title in titles if not title.startswith("=")]
     columns = [profile_columns.get(title, RigColumn(title=title, channel=None)) for title in of_file]
     columns += [column for title, column in profile_columns.items() if title.startswith("=")]
-    fields = profile_fields | suggested | {"columns": columns}
+    fields = profile_fields | own | {"columns": columns}
     of_profile = {name: value for name, value in fields.items() if name in RigProfile.model_fields}
     return RigProfile.model_construct(**of_profile)  # not checked: no column need have a channel yet
 
@@ -218,6 +267,7 @@ def _evaluated(
     filename: str,
     reading: Reading | None,
     kind: FileKindName | None,
+    *,
     geometry: Geometry,
     torque_filter: float,
 ) -> _Evaluated:

@@ -157,6 +157,13 @@ FileSkipRows = Annotated[
     int, SHORT, Field(ge=0, le=base.MAX_SKIPPED, description="Number of lines above the table to skip")
 ]
 FileName = Annotated[str, Field(max_length=base.LONGEST_FILENAME, description="The sender's name for the file")]
+FilesTogether = Annotated[
+    list[Annotated[str, Field(max_length=base.LONGEST_FILENAME)]],
+    Field(
+        max_length=base.MAX_COLUMNS,
+        description="The names of the files that came with it: what changes in all of them may be the cycles",
+    ),
+]
 FileRunId = Annotated[
     str | None, Field(pattern=base.IDENTIFIER_PATTERN, description="The run's name; default: derived from the content")
 ]

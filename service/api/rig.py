@@ -74,13 +74,18 @@ class RigProfile(Schema):
     )
     file_name: Text | None = Field(
         default=None,
-        description="Pattern of the file's name: `{cycles}`, `{kind}`, `{run_id}` and `*` stand for the parts that change",
+        description="Pattern of the file's name: `{cycles}`, `{kind}`, `{run_id}`, `{clutch_id}` and `*` stand for the parts"
+        " that change",
     )
     kinds: dict[Text, FileKindName] = Field(
         default_factory=dict, max_length=base.MAX_WORDS, description="The words that stand for `{kind}` in the name"
     )
     cycles_cell: Text | None = Field(
         default=None, description="Label above the table that stands beside the number of cycles, such as `Lastspiele`"
+    )
+
+    clutch_cell: Text | None = Field(
+        default=None, description="Label above the table that stands beside the clutch's id, such as `Kupplung`"
     )
 
     @model_validator(mode="after")
@@ -122,7 +127,6 @@ class PreviewColumn(Answer):
     stated_unit: str | None = Field(description="The unit that the file states; null: none")
     unit: str | None = Field(description="The unit that is used; null: none, or the column is ignored")
     channel: ChannelName | None = Field(description="The channel; null: the column is ignored")
-    in_part: bool = Field(description="Whether words of its title are not known, so that the channel should be checked")
     scale: Real = Field(description="The scale, in the channel's unit")
     offset: Real = Field(description="The offset, in the channel's unit")
 
@@ -134,6 +138,37 @@ class PreviewPiece(Answer):
     stop_s: Real = Field(description="Its end, s")
     pressure_bar: Real = Field(description="Line pressure, bar")
     speed_rpm: Real | None = Field(description="Speed of a plateau, rpm; null for a stretch")
+
+
+class Suggestion(Answer):
+    """A complete reading of a file that is not read without a question. Nothing is read by it until somebody confirms it:
+    with the arguments `map`, `table`, `time`, ... as they stand here, or with `profile` in a form. A new name in `rig` keeps
+    it as that rig's profile.
+    """
+
+    why: str = Field(description="Why the file is not read without a question")
+    map: dict[ChannelName, str] = Field(description="The column of each channel, as the argument `map` takes it")
+    table: str = Field(description="The sheet, group or archived file; may be empty")
+    time: str = Field(description="The time column; `none`: each row is a plateau; empty: as `map` or the file says")
+    decimal: str = Field(description="The decimal sign; empty: detected")
+    missing: str = Field(description="Marks of missing values; may be empty")
+    good: str = Field(description="Codes of good rows; may be empty")
+    kind: FileKindName = Field(description="The kind of run, by the file's name or its channels")
+    cycles: Real | None = Field(description="Cycles, by the file's name or a cell; null: nothing says them")
+    clutch_id: str | None = Field(description="The clutch, by the file's name or a cell; null: nothing says it")
+    confidence: Real = Field(description="How sure the columns, units and clock are, 0 to 1")
+    rows: list[dict[ChannelName, Real]] = Field(
+        description="The first rows as they would be read, in the channels' units"
+    )
+    profile: RigProfile = Field(description="The reading as a rig profile that can be saved")
+
+
+class SuggestedRun(Answer):
+    """What the names of the files and the cells above the table suggest of the run, for a person to confirm."""
+
+    kind: FileKindName | None = Field(description="The kind of run; null: they do not say it")
+    cycles: Real | None = Field(description="Cycles; null: they do not say them")
+    clutch_id: str | None = Field(description="The clutch; null: they do not say it")
 
 
 class Preview(Answer):
@@ -154,6 +189,11 @@ class Preview(Answer):
         description="Cycles: from the request, or through the profile from the file's name or a cell"
     )
     run_id: str | None = Field(description="The run's name, if the profile finds one in the file's name")
+    clutch_id: str | None = Field(description="The clutch, if the profile finds it in the file's name or a cell")
+    suggested_run: SuggestedRun = Field(description="What names and cells suggest of the run")
+    suggestion: Suggestion | None = Field(
+        description="If the file is not read without a question: how it may be read, which the rest of this preview shows"
+    )
     rows: int = Field(description="Samples of each channel")
     kinds: list[FileKindName] = Field(description="The kinds of run that the channels allow")
     missing: list[str] = Field(

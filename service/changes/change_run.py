@@ -43,7 +43,7 @@ from service.clutch.timeline import (
 )
 from service.clutch.with_held import held_summary, summarised
 from service.errors import Notice, NotPossibleNowError
-from service.runs.upload import read_file_run
+from service.runs.upload import file_kind, read_file_run
 from storage import changes, raw_columns, runs
 from storage.engine.database import Database
 from storage.raw_columns import Encoded
@@ -148,7 +148,7 @@ def read_again(
         run = read_file_run(
             path,
             filename=file["filename"],
-            kind=row.kind,
+            kind=file_kind(row.kind),
             cycles=sent_cycles,
             run_id=run_id,
             started_at=None if row.started_at is None else datetime.fromisoformat(row.started_at),

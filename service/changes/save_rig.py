@@ -3,6 +3,7 @@
 Runs that were read by a former version stay as they are; `change_run.read_again` reads one by the profile in force.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 
 from service import repository
@@ -32,3 +33,8 @@ def save(database: Database, rig: RigIn, *, by: str, at: str, replacing: bool = 
             raise ConflictError(f"rig {rig.name!r} already has another profile; replace it with PUT")
         rigs.put(connection, replace(row, version=stored.version + 1))
         return repository.rig(connection, rig.name), False
+
+
+def save_confirmed(database: Database, confirmed: Callable[[], RigIn], by: str, at: str) -> tuple[RigOut, bool]:
+    """Save the profile of a new rig, by which a run's file was read as its sender confirmed. Raises as `save` does."""
+    return save(database, confirmed(), by=by, at=at)

@@ -8,6 +8,7 @@ from rich.table import Table
 
 from service.cli.options import EX_DATAERR, ChannelMap, Decimal, Good, Missing, asking, fail, out, print_line
 from service.cli.runs import run_line
+from service.client.clutchlife.answers import suggested
 from service.client.clutchlife.transport import Service
 
 _KINDS = ("stationary_stribeck", "dynamic_stribeck")
@@ -53,7 +54,12 @@ def import_file(
         fail(shown["problem"], EX_DATAERR)
     if shown["missing"]:
         fail(f"still missing: {', '.join(shown['missing'])}", EX_DATAERR)
-    if not yes and not typer.confirm(f"Send it to {clutch}?", default=True):
+    if shown["suggestion"] is not None and profile is None:
+        if yes:
+            why = shown["suggestion"]["why"]
+            fail(f"{why}; {suggested(shown['suggestion'])}. To confirm that, import it without --yes", EX_DATAERR)
+        profile, options["time"] = shown["profile"], shown["suggestion"]["time"] or None
+    if not yes and not typer.confirm(_question(shown, clutch), default=shown["suggestion"] is None):
         raise typer.Exit(0)
     if shown["rig"] is None and save is None and not yes:
         question = "Name of a new rig profile for such files (leave it empty to save none)"
@@ -66,6 +72,14 @@ def import_file(
     options |= {"kind": options["kind"] or shown["kind"], "cycles": shown["cycles"]}
     receipt = _sent(service, f"/v1/clutches/{clutch}/runs/file", file, options, profile)
     print_line(run_line(receipt) + ("  stored before" if receipt["duplicate"] else ""))
+
+
+def _question(shown: dict[str, Any], clutch: str) -> str:
+    """What is asked before a file is sent."""
+    if shown["suggestion"] is None:
+        return f"Send it to {clutch}?"
+    sure = f"{shown['suggestion']['confidence']:.0%}"
+    return f"These columns are suggested, not certain ({sure}). Are they right? Send it to {clutch}?"
 
 
 def _sent(
@@ -89,8 +103,6 @@ def _show(shown: dict[str, Any]) -> None:
     for index, column in enumerate(shown["columns"]):
         read = column["channel"] is not None
         channel = column["channel"] or "left out"
-        if column["in_part"]:
-            channel += " (check: its title was recognised only in part)"
         unit = (column["unit"] if read else column["stated_unit"]) or ""
         converted = (f"{column[name]:g}" if read else "" for name in ("scale", "offset"))
         rows = (row[index] if index < len(row) else "" for row in shown["first_rows"][:_ROWS])
@@ -116,7 +128,8 @@ def _answered(shown: dict[str, Any], given: dict[str, Any], profile: dict[str, A
         if name == "kind":
             given["kind"] = _choice("Kind of run", list(shown["kinds"] or _KINDS))
         elif name == "cycles":
-            given["cycles"] = typer.prompt("Duty cycles since new", type=float)
+            said = shown["suggested_run"]["cycles"]
+            given["cycles"] = typer.prompt("Duty cycles since new", type=float, default=said)
         elif name.startswith("unit of "):
             own_column = next(column for column in columns if column["title"] == name.removeprefix("unit of "))
             own_column |= {"unit": _choice(name[0].upper() + name[1:], shown["units"][own_column["channel"]])}

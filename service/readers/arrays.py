@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 
 from models.arrays import FloatArray
 from service.errors import InvalidError, Notice
-from service.readers.column_names import column_of, known_channel, recognised
+from service.readers.column_names import column_of, recognised
 from service.readers.limits import Limits
+from service.readers.meanings import known_channel
 from service.readers.numerals import Stamps, is_stamp
 from service.readers.stated_clocks import UNITS, stated_clock
 from service.readers.table import Clock, FileColumn, Reading, Table, index_of_wanted

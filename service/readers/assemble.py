@@ -21,15 +21,17 @@ from service.readers.column_names import (
     choices_of,
     choose,
     is_counter,
-    known_channel,
+    like_a_time,
     may_be_time,
     no_unit,
     part_of_second,
+    perhaps_the_time,
     several_times,
 )
 from service.readers.constants import constants, stacked_columns
 from service.readers.limits import Limits
 from service.readers.long_table import says_valid, valid_rows, widened
+from service.readers.meanings import known_channel
 from service.readers.missing_values import drop_totals, mask_stated_marks, refuse_stand_ins
 from service.readers.numerals import empty_cells, plain, read_cells
 from service.readers.table import NO_TIME, Clock, FileColumn, Reading, Table, index_of_wanted, labels, marks
@@ -130,7 +132,9 @@ def _chosen_table(columns: dict[str, FloatArray], table: Table, reading: Reading
     tables = [f"{table.name}/{number}" if table.name else str(number) for number in range(1, len(starts))]
     if table.breaks and time_s is not None and reading.table not in tables:
         steps = np.diff(time_s)
-        if all(0 < steps[row - 1] < _LONGEST_PAUSE * np.median(steps) for row in table.breaks):
+        # rows that are left out may leave fewer than stood above a title
+        within = all(0 < row <= steps.size for row in table.breaks)
+        if within and all(0 < steps[row - 1] < _LONGEST_PAUSE * np.median(steps) for row in table.breaks):
             return columns, 0
     asked_table = reading.table if table.breaks and reading.table != table.name else ""
     number = index_of_wanted(tables, asked_table, "table")
@@ -146,6 +150,7 @@ def _clocks(
     named = {at: column.index for column in taken for at in column.clock_of}
     times = {at: clock for at, clock in all_times.items() if at not in named.values()} or all_times
     clocks: dict[int, Clock | None] = {}
+    coarse: dict[int, bool] = {}
     for index in (column.index for column in taken if column.channel != "time_s"):
         recorder = columns[index].clock
         if index in named or (recorder is not None and recorder.own):
@@ -154,8 +159,13 @@ def _clocks(
         of_group = [at for at in times if columns[at].group == columns[index].group]
         if of_group:
             chosen = max((at for at in of_group if at < index), default=of_group[0])
-            coarse = np.unique(values[chosen]).size < values[chosen].size
-            finer = recorder if recorder is not None and coarse and _agree(recorder.read(), values[chosen]) else None
+            if recorder is not None and chosen not in coarse:
+                coarse[chosen] = _repeats(values[chosen])
+            finer = (
+                recorder
+                if recorder is not None and coarse[chosen] and _agree(recorder.read(), values[chosen])
+                else None
+            )
             clocks[index] = finer or times[chosen]
         else:
             clocks[index] = recorder or (next(iter(times.values())) if len(times) == 1 else None)
@@ -172,12 +182,42 @@ def _clocks(
     return clocks
 
 
+def _may_be_clocks(table: Table, channels: Mapping[int, str], reading: Reading) -> list[int]:
+    """The columns that may be the time of a channel, or of all where no column is the time; none where the caller named
+    one."""
+    if reading.time == NO_TIME or reading.only_named or "time_s" in choices_of(reading):
+        return []
+    others = [(at, own) for at, own in enumerate(table.columns) if at not in channels]
+    if "time_s" in channels.values():
+        return [at for at, own in others if may_be_time(own)]
+    # a caller who named columns knows those whose names say nothing
+    return [at for at, own in others if like_a_time(own) and not (reading.mapping and may_be_time(own))]
+
+
+def as_seconds(column: FileColumn, values: NDArray[Any]) -> FloatArray:
+    """A column that may be the time, in s; one without a unit as it is."""
+    if values.dtype.kind in "Mm":
+        return np.asarray((values - values[:1]) / _SECOND, dtype=np.float64)
+    converted = conversion("time_s", column.unit or "s")
+    return plain(values) * (1.0 if converted is None else converted.factor)
+
+
+def _repeats(times: FloatArray) -> bool:
+    """Whether any time stands in more than one row."""
+    steps = np.diff(times)
+    return not (steps > 0).all() and np.unique(times).size < times.size
+
+
 def _refuse_passed_over(column: FileColumn, seconds: FloatArray, clocks: Mapping[int, Clock | None]) -> None:
-    """Raise InvalidError where a column in a unit of time that names nothing runs like a clock that is used, and begins
-    within its record at another time: it may be that of a channel."""
-    for clock in clocks.values():
-        used = None if clock is None else clock.read()
-        if used is None or used.size != seconds.size or used.size < 2 or not _runs_on(seconds):
+    """Raise InvalidError where a column that may be the time runs on and there is no other clock; or where it runs like a
+    clock that is used, and begins within its record at another time: it may be that of a channel."""
+    if not any(clocks.values()) and runs_on(seconds):
+        raise perhaps_the_time(column)
+    all_used = [clock.read() for clock in {id(own): own for own in clocks.values() if own is not None}.values()]
+    if any(np.array_equal(used, seconds) for used in all_used):
+        return  # the array of one of these clocks
+    for used in all_used:
+        if used.size != seconds.size or used.size < 2 or not runs_on(seconds):
             continue
         shift = abs(float(seconds[0] - used[0]))
         if _agree(seconds, used) and _step(used) / 2 < shift < float(np.ptp(used)):
@@ -185,10 +225,10 @@ def _refuse_passed_over(column: FileColumn, seconds: FloatArray, clocks: Mapping
 
 
 def _column_clock(columns: Sequence[FileColumn], column: Taken, values: Mapping[int, FloatArray]) -> Clock:
-    """A column as a clock. LabVIEW's text files number their rows where they have no clock, so a guessed time column, or one
-    with whole numbers from 0, may be a sample counter (`counts`)."""
+    """A column as a clock. LabVIEW's text files number their rows where they have no clock, so a column of whole
+    numbers from 0 may be a sample counter (`counts`)."""
     times = values[column.index]
-    counts = column.guessed or (is_counter(columns[column.index]) and np.array_equal(times, np.arange(times.size)))
+    counts = is_counter(columns[column.index]) and np.array_equal(times, np.arange(times.size))
     return Clock(column.index, lambda: times, counts=counts)
 
 
@@ -201,7 +241,7 @@ def _agree(times: FloatArray, others: FloatArray) -> bool:
     return bool(max_difference <= max(steps) * (1 + 1e-9))
 
 
-def _runs_on(times: FloatArray) -> bool:
+def runs_on(times: FloatArray) -> bool:
     """Whether a column may be a clock: nine of ten of its steps go on. Chosen: of durations in any order half do."""
     steps = np.diff(times[~np.isnan(times)])
     return bool(steps.size > 0 and np.count_nonzero(steps > 0) >= _MOST_OF * steps.size)
@@ -231,8 +271,7 @@ def _read(
     if reading.time != NO_TIME and "time_s" in channels.values():
         unused = {at: own for at, own in enumerate(table.columns) if at not in indices}
         parts = {at: factor for at, own in unused.items() if (factor := part_of_second(own))}
-    timed = [at for at, own in enumerate(table.columns) if at not in indices and at not in parts and may_be_time(own)]
-    timed = timed if "time_s" in channels.values() and "time_s" not in choices_of(reading) else []
+    timed = [at for at in _may_be_clocks(table, channels, reading) if at not in parts]
     beside = dict.fromkeys(says, "") | dict.fromkeys([*parts, *timed], "time_s")
     read = read_cells(table, beside | channels, reading)
     read |= {index: mask_stated_marks(read[index], reading) for index in indices}
@@ -254,14 +293,11 @@ def _read(
     for name in (table.columns[at].shown() for at in added if at is not None):
         message = f"time_s has whole seconds: the fractions in {name} were added"
         notices.append(Notice(code="parts_of_seconds", message=message))
-    chosen = [column for column in chosen if not column.guessed or _runs_on(values[column.index])]
     clocks = {} if reading.time == NO_TIME else _clocks(table.columns, chosen, values)
     if len({clock.key in moments for clock in clocks.values() if clock is not None and clock.key in values}) > 1:
         raise several_times("points in time and numbers")
     other_times = {at: seconds for at, seconds in part_seconds.items() if at not in added and table.columns[at].unit}
-    for at in timed:
-        converted = conversion("time_s", table.columns[at].unit or "")
-        other_times |= {} if converted is None else {at: converted.factor * plain(read[at])}
+    other_times |= {at: as_seconds(table.columns[at], read[at]) for at in timed}
     for at, seconds in other_times.items() if "time_s" not in choices_of(reading) else ():
         _refuse_passed_over(table.columns[at], seconds, clocks)
     used = {clock.key: clock for clock in clocks.values() if clock is not None}
@@ -292,6 +328,8 @@ def _drop_empty_rows(name: str, own: _Series, table: Table, leave_out: bool) -> 
     `leave_out`: rows with any other empty cell are left out; else InvalidError is raised on them.
     """
     missing, invalid = np.isnan(own.values), own.valid
+    if table.line_of is None and not leave_out and not missing.any():
+        return own
     if table.line_of is not None and not leave_out:
         own.valid = None  # a cell's mask says that it is empty
     if own.times is not None and own.times.size == missing.size and not missing.all():
@@ -365,11 +403,9 @@ def _in_seconds(column: FileColumn, times: FloatArray, reading: Reading) -> list
 def _left_out(columns: Mapping[int, FileColumn], taken: Sequence[Taken], reading: Reading) -> list[Notice]:
     """Notices about columns of the table that are not used."""
     notices = []
-    if part := [f"{column.channel} from {columns[column.index].shown()}" for column in taken if column.in_part]:
-        message = f"only a part of these titles was recognised, so check them: {', '.join(part)}"
-        notices.append(Notice(code="name_in_part", message=message))
     used = {column.index for column in taken}
     others = [column for index, column in columns.items() if index not in used and (column.title or column.name)]
+    others = [own for own in others if not {own.title, own.name, f"{own.group}/{own.name}"} & {*reading.left_out}]
     if reading.time == NO_TIME:
         others = [column for column in others if known_channel(column.name) != "time_s"]
     if others:

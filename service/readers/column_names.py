@@ -1,95 +1,35 @@
-"""A file's column titles -> channels and their units: by public name, by synonym, or by an explicit map."""
+"""A file's column titles -> channels and their units: by public name, by synonym, or by an explicit map.
+
+Nothing else is taken: what a column may be besides is a suggestion (`suggest`).
+"""
 
 import re
-import unicodedata
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from enum import Enum
-from functools import lru_cache
 
 from service.channels import CHANNELS
 from service.errors import MAX_QUOTED, FieldError, InvalidError
 from service.readers.limits import LONGEST_MAP, LONGEST_NAME, LONGEST_TITLE, LONGEST_UNIT
+from service.readers.meanings import (
+    MEANS,
+    SYMBOLS,
+    UNITS_AS_TITLES,
+    Sense,
+    is_another,
+    key,
+    known_channel,
+    meaning,
+    measures,
+    of_time,
+    words,
+)
 from service.readers.table import NO_TIME, ColumnChoice, FileColumn, Reading
 from service.readers.unit_table import Conversion, conversion, is_unit, spellings
 
-#: Single letters have their meaning in mechanics: capitals count (M is a torque, n a speed, p a pressure, t a time).
-_LETTERS = {"M": "torque_nm", "n": "speed_rpm", "p": "pressure_bar", "t": "time_s"}
-#: Names that are no words: LabVIEW's of its times, and a unit that stands for what is in it.
-_NAMES = {name: name for name in CHANNELS} | {"x_value": "time_s", "rpm": "speed_rpm"}
-#: Names of a time that are its unit, as historians title a column (`SECONDS`).
-_UNITS_AS_TITLES = {
-    "sec",
-    "secs",
-    "second",
-    "seconds",
-    "sekunden",
-    "msec",
-    "millisecond",
-    "milliseconds",
-    "millisekunden",
-}
-_NAMES |= dict.fromkeys(_UNITS_AS_TITLES, "time_s")
-#: Quantity -> the words that name it. One with a dash may also end a compound (Anpressdruck, 油压, Messzeit).
-_NOUNS = {
-    "time_s": "time -zeit temps tiempo tempo tout -stamp ts timestamps -stempel date datum datetime fecha elapsed čas czas "
-    "tijd tid zaman -时间 -時間 -時刻 -日時 время 시간",
-    "pressure_bar": "pressure press pres -druck pression presión presion pressione pressão ciśnienie tlak tryck basınç druk "
-    "-压力 -油压 -壓力 -油壓 -圧力 -油圧 давление -압력",
-    "speed_rpm": "speed spd velocity -drehzahl -geschwindigkeit omega vitesse velocidad velocità velocidade rotação "
-    "prędkość otáčky toerental varvtal devir hız régime -회전수 -转速 -轉速 -回転数 -回転速度 обороты -frequenz frequency "
-    "frecuencia fréquence частота",
-    "torque_nm": "torque trq tq md -moment couple par coppia binário koppel vridmoment tork -力矩 -扭矩 -转矩 -轉矩 -トルク "
-    "момент -토크",
-    "temperature": "temperature -temp toil oiltemp oiltemperature -temperatur -temperatuur température temperatura teplota "
-    "sıcaklığı theta -温 -溫 -온 температура",
-}
-#: Letters that stand for a quantity beside another word or a unit, which decides between several.
-_SYMBOLS = {
-    "p": ("pressure_bar",), "n": ("speed_rpm",), "m": ("torque_nm",), "t": ("time_s", "torque_nm", "temperature"),
-}  # fmt: skip
-#: Words at a name that say that its values are means.
-_MEANS = {"mean", "average", "avg", "ave", "mittelwert", "mittel", "moyenne", "moy", "media"}
-#: Words that leave a quantity that of the clutch.
-_PLAIN = (
-    "ist act actual istwert messwert measured sensor signal channel kanal clutch kupplung kupplungs embrayage embrague of "
-    "the de del der des di du d"
-)
-_WHOLE = "abs absolute absolut"  # of a pressure another one: from vacuum on
-_PLAIN_OF = {
-    "time_s": f"{_WHOLE} standardmessrate default sample rate time zeit mess uhr date datum elapsed hora y und and",
-    "pressure_bar": "line leitung leitungs anpress kolben piston",
-    "speed_rpm": f"{_WHOLE} rotational rotation shaft differential diff slip relative rel dreh winkel angular differenz "
-    "schlupf giro obrotowa drum trommel welle вращения",
-    "torque_nm": f"{_WHOLE} friction reib frottement fricción dreh obrotowy kroutící 摩擦 r",
-    "temperature": "",
-}
-#: Whose temperature it is.
-_OIL = {
-    "oil", "toil", "oiltemp", "oiltemperature", "öl", "olje", "oleje", "yağ", "유", "sump", "sumpf", "huile", "aceite",
-    "olie", "olio", "óleo", "oleju", "масла", "油",
-}  # fmt: skip
-_PLATE, _REAR = {"plate", "platte", "platten", "lamelle", "lamellen"}, {"rear", "hinten"}
-_SPREAD = {"sd", "std", "deviation", "standard", "standardabweichung"}
-#: Beginnings of words that make it another thing than what is measured at the clutch.
-_OTHER = re.compile(
-    "set|soll|sp$|target|ziel|cmd|command|demand|anford|ref|desired|consign|nomin|nenn|rated|lim|grenz|alarm|warn|max|min|"
-    "peak|spitz|sd$|std|stand|devia|abweich|err|fehl|difference|ratio|rate|grad|deriv|änderung|offset|zero|null|tar[ae]$|"
-    "gain|coef|koef|calc|berech|estim|model|simul|predict|drag|schlepp|bearing|lager|loss|verlust|lube|schmier|ambient|"
-    "umgeb|baro|atmos|luft|air$|supply|versorg|tank|pump|fan$|raw$|roh$|"
-    "abs(?:ol|$)|rippl|ampl|uncert|unsich|request|bend|biege|inert|träghe|idle|leerl|cool|kühl|critic|kriti"
-)
 #: Times whose program writes seconds and no unit: LabVIEW's text files, asammdf's exports, Simulink's.
 _SECONDS = frozenset({"x_value", "timestamps", "tout"})
 #: A column that holds what of a time is less than a second.
 _PART_OF_SECOND = re.compile(r"fraction|bruchteil|sub_?second", re.IGNORECASE)
-#: What makes a name that of another quantity: a sign, a power, a half.
-_COMPUTED = re.compile(r"^[-−][^\W\d]|\^ ?[2-9]|[²³√]|/ ?[2-9](?![\d^.,/])")
-#: Words that are a speed only beside one of what turns.
-_FREQUENCY = re.compile("fr[eé]qu?[eu]|frecu|частота")
-#: Channels in whose unit another column may be the one that is meant.
-_MEASURED = ("pressure_bar", "speed_rpm", "torque_nm")
-
 #: Columns that one message names.
 _MAX_NAMED = 10
 
@@ -98,33 +38,17 @@ _MAX_NAMED = 10
 class Taken:
     """A column that is taken: the file's `index`-th as `channel`, with its conversion to the channel's unit.
 
-    `unit`: the one that file or caller states; None: neither does, and the channel's own was taken. `guessed`: a time by its
-    unit and a word in its name, which its values must bear out. `in_part`: words of its name are not known, and no other
-    column fits. `clock_of`: the columns of which alone it is the time, as it names them (`t_M`).
+    `unit`: the one that file or caller states; None: neither does, and the channel's own was taken. `clock_of`: the columns
+    of which alone it is the time, as it names them (`t_M`).
     """
 
     channel: str
     index: int
     conversion: Conversion
     unit: str | None
-    guessed: bool = False
-    in_part: bool = False
     clock_of: frozenset[int] = frozenset()
 
 
-def _key(name: str) -> str:
-    """Names that differ in case, blanks, dashes, width or in ö for oe are one name.
-
-    Composing letters takes time with the square of the length where accents are piled up: only short names are composed.
-    """
-    plain = (unicodedata.normalize("NFKC", name) if len(name) <= LONGEST_NAME else name).strip().casefold()
-    plain = plain.replace("oel", "öl").replace("θ", "theta").replace("ϑ", "theta").replace("ω", "omega")
-    return re.sub(r"[\s._\-]+", "_", plain).strip("_")
-
-
-_QUANTITIES = {word.strip("-"): quantity for quantity, words in _NOUNS.items() for word in words.split()}
-_ENDS = [word.strip("-") for words in _NOUNS.values() for word in words.split() if word.startswith("-")]
-_NEUTRAL = {quantity: _MEANS.union(f"{_PLAIN} {words}".split()) for quantity, words in _PLAIN_OF.items()}
 #: What in a name may say that its values are multiples: `x10`, `/100`, `(10^-3)`, `gain 10`, `10*M`.
 _SCALED = re.compile(
     r"/ ?(?:10+|0[.,]0*1)(?![\d^.,])|(?<![\w.,])(?:10+|0[.,]0*1) ?(?:[x×](?![^\W_])|[*·])"
@@ -148,84 +72,6 @@ _BRACKET = re.compile(r"[\[({<]([^\[\](){}<>]*(?:\([^()]*\))?)[\])}>]")
 _BETWEEN = re.compile(r"\s*[,;:|]\s*|\s*/\s*|\s+in\s+|[\s_]+")
 
 
-class Sense(Enum):
-    """How a name is understood: wholly; but for words that are not known; as another thing (a set point, a limit); not."""
-
-    WHOLE, PART, OTHER, UNKNOWN = range(4)
-
-
-@lru_cache(maxsize=4096)
-def meaning(name: str, unit: str | None = None) -> tuple[str | None, Sense]:
-    """The channel that a name and its unit stand for, and how well they are understood.
-
-    One quantity's noun, or without any its symbol, names the channel; the other words leave it that of the clutch, make it
-    another thing, or are not known. What follows a backslash names a device (`torque\\CAN:1`); numbers and few letters
-    before them are labels (`CH1-1`). A symbol, and a name that is understood in part, must have a unit that fits.
-    """
-    bare = name.partition("\\")[0].strip()
-    key = _key(bare) if len(bare) <= LONGEST_NAME else ""
-    if known := _LETTERS.get(bare) or _NAMES.get(key):
-        return known, Sense.WHOLE
-    words = _words(bare) if key else []
-    if _COMPUTED.search(bare):
-        return None, Sense.OTHER
-    parts = [(word, next((end for end in _ENDS if word.endswith(end)), word)) for word in words]
-    parts = [(word, word if word in _QUANTITIES else noun) for word, noun in parts]
-    quantities = {_QUANTITIES[noun] for _, noun in parts if noun in _QUANTITIES}
-    unknown_words = {word.removesuffix(noun) if noun in _QUANTITIES else word for word, noun in parts} - {""}
-    by_noun = bool(quantities)
-    if not by_noun:
-        symbol = next((word for word in words if word in _SYMBOLS), "")
-        quantities = {q for q in _SYMBOLS.get(symbol, ()) if (len(words) > 1 and unit is None) or _measures(q, unit)}
-        if len(quantities) > 1:
-            hot = bool(unknown_words & (_OIL | _PLATE))
-            quantities = {quantity for quantity in quantities if (quantity == "temperature") == hot}
-    if len(quantities) != 1:
-        return None, Sense.UNKNOWN
-    (quantity,) = quantities
-    unknown_words -= {word for word, of in _SYMBOLS.items() if quantity in of} | _NEUTRAL[quantity]
-    channel = quantity
-    if quantity == "temperature":
-        of = unknown_words | set(words)
-        channel = "oil_temperature_c" if of & _OIL else "plate_temperature_" + ("rear_c" if of & _REAR else "front_c")
-        if not of & (_OIL | _PLATE):
-            return None, Sense.UNKNOWN
-        unknown_words -= _OIL | _PLATE | _REAR | {"front", "vorn", "vorne"}
-    elif quantity == "torque_nm" and unknown_words & _SPREAD:
-        channel, unknown_words = "torque_sd_nm", unknown_words - _SPREAD
-    if any(map(_OTHER.match, unknown_words)):
-        return None, Sense.OTHER
-    if any(_FREQUENCY.search(noun) for _, noun in parts) and (unknown_words or len(words) == 1 == len(set(parts[0]))):
-        return None, Sense.UNKNOWN
-    if not unknown_words and (by_noun or unit is None or _measures(quantity, unit)):
-        return channel, Sense.WHOLE
-    return (channel, Sense.PART) if _measures(quantity, unit) else (None, Sense.UNKNOWN)
-
-
-def _words(name: str, *, digits: bool = False) -> list[str]:
-    """The words of a name in small letters, without labels that end in a number; or with them (`digits`)."""
-    key = _key(re.sub(r"(?<=[a-zäöüß])(?=[A-Z])", " ", name))
-    if digits:
-        return re.findall(r"[^\W_]+", key)
-    key = re.sub(r"(?<![^\W_])(?:ch|ai|cnt|kanal|max_?|[a-z])?\d+(?![^\W_])", " ", key)
-    return re.findall(r"[^\W\d_]+", key)
-
-
-def _measures(quantity: str, unit: str | None) -> bool:
-    """Whether a unit is one of a quantity's."""
-    return unit is not None and conversion(quantity if quantity in CHANNELS else "oil_temperature_c", unit) is not None
-
-
-def known_channel(name: str) -> str | None:
-    """The public channel that a name stands for, whatever its unit, or None."""
-    channel, sense = meaning(name)
-    return channel if sense is Sense.WHOLE else None
-
-
-def _is_another(name: str) -> bool:
-    return any(map(_OTHER.match, _words(name[:LONGEST_NAME])))
-
-
 def is_time(column: FileColumn) -> bool:
     """Whether a column is a time by its name, or may be one by its unit."""
     return meaning(column.name, column.unit)[0] == "time_s" or may_be_time(column)
@@ -239,7 +85,7 @@ def part_of_second(column: FileColumn) -> float | None:
 
 def is_counter(column: FileColumn) -> bool:
     """Whether a time column's title is LabVIEW's, which may count samples."""
-    return _key(column.name) == "x_value"
+    return key(column.name) == "x_value"
 
 
 def column_of(text: str, unit: str | None = None, group: str = "", *, moments: bool = False) -> FileColumn:
@@ -256,7 +102,7 @@ def column_of(text: str, unit: str | None = None, group: str = "", *, moments: b
         )
         raise InvalidError.of(message, code="title_too_long", value=shown)
     name, title_unit = _taken_apart(" ".join(title.translate(_WIDE).split()))
-    title_unit = name if title_unit is None and _key(name[:LONGEST_NAME]) in _UNITS_AS_TITLES else title_unit
+    title_unit = name if title_unit is None and key(name[:LONGEST_NAME]) in UNITS_AS_TITLES else title_unit
     column = FileColumn(name, "s" if moments else title_unit, group, title)
     return column if unit is None or moments else with_unit(column, unit)
 
@@ -350,13 +196,15 @@ def named_columns(reading: Reading) -> list[str]:
 
 def recognised(titles: Sequence[str], named: Sequence[str]) -> int:
     """How many titles are those of channels or are `named`: by it the row of titles is found."""
-    wanted_keys = {_key(name) for name in named} | {_key(column_of(name).name) for name in named}
+    wanted_keys = {key(name) for name in named} | {key(column_of(name).name) for name in named}
     channels: set[str] = set()
     for title in titles:
         if 0 < len(title) <= LONGEST_TITLE:
             column = column_of(title)
+            if is_unit(title) and meaning(title)[0] is None:
+                continue  # a unit, of which a part may look like a title (`giri/min`)
             channel = "time_s" if is_time(column) else meaning(column.name, column.unit)[0]
-            keys = {_key(title), _key(column.name)} & wanted_keys
+            keys = {key(title), key(column.name)} & wanted_keys
             channels |= keys or ({channel} if channel else set())
     return len(channels)
 
@@ -395,36 +243,25 @@ def understood(columns: Sequence[FileColumn], reading: Reading) -> tuple[list[Ta
     senses = {index: meaning(columns[index].name, columns[index].unit) for index in free}
     chosen = dict(by_map)
     clocks_of = {} if reading.time == NO_TIME else _clocks_by_name(columns)
-    guessed: set[int] = set()
-    in_part: set[int] = set()
     for channel in CHANNELS:
         if channel in named or (channel == "time_s" and reading.time == NO_TIME):
             continue
-        whole, part = ([at for at in free if senses[at] == (channel, sense)] for sense in (Sense.WHOLE, Sense.PART))
+        whole = [at for at in free if senses[at] == (channel, Sense.WHOLE)]
         # neither a mean beside the signal itself nor what stands in a group of set points
-        plain = [at for at in whole if not (_MEANS & {*_words(columns[at].name)} or _is_another(columns[at].group))]
-        candidates = plain or whole or part
-        unknown = [] if whole else [at for at in free if senses[at][1] is Sense.UNKNOWN]
-        rivals = [at for at in unknown if _measures(channel, columns[at].unit)]
-        if channel == "time_s":
-            candidates = candidates or ([] if by_map else rivals)
-            guessed = set() if whole else {*candidates}
+        plain = [at for at in whole if not (MEANS & {*words(columns[at].name)} or is_another(columns[at].group))]
+        candidates = plain or whole
+        if channel == "time_s" or len(candidates) == 1:
             chosen |= dict.fromkeys(candidates, channel)
-        elif len(candidates) == 1 and not (rivals and channel in _MEASURED):
-            chosen[candidates[0]] = channel
-            in_part |= set() if whole else {*candidates}
-        elif candidates and (whole or channel in _MEASURED):
-            errors.append(_twice(channel, *(columns[index] for index in candidates + rivals)))
+        elif candidates:
+            errors.append(_twice(channel, *(columns[index] for index in candidates)))
     for at, of in clocks_of.items():
         if at not in chosen and of & chosen.keys():
             chosen[at] = "time_s"
-    if not {*chosen} - guessed:
-        return [], errors
     columns_taken: list[Taken] = []
     unstated: list[tuple[str, FileColumn]] = []
     for index, channel in sorted(chosen.items()):
         asked_column = named.get(channel) if index in by_map else None
-        public = _key(columns[index].name) == channel
+        public = key(columns[index].name) == channel
         unit, converted = None, Conversion()
         try:
             unit = _unit(channel, columns[index], asked_column)
@@ -436,7 +273,7 @@ def understood(columns: Sequence[FileColumn], reading: Reading) -> tuple[list[Ta
             unstated += [(channel, columns[index])] if unit is None and asked_column is None and not public else []
         unit = CHANNELS[channel].unit if unit is None and public else unit
         clock_of = frozenset() if index in by_map or channel != "time_s" else clocks_of.get(index, frozenset())
-        columns_taken.append(Taken(channel, index, converted, unit, index in guessed, index in in_part, clock_of))
+        columns_taken.append(Taken(channel, index, converted, unit, clock_of))
     if any(channel != "time_s" for channel, _ in unstated):
         errors.append(no_unit(unstated, reading))
     return columns_taken, errors
@@ -446,20 +283,20 @@ def _clocks_by_name(columns: Sequence[FileColumn]) -> dict[int, frozenset[int]]:
     """The columns of times that name other columns, and the ones that they name: `t_M` M, `Zeit Moment` the torque's."""
     found: dict[int, frozenset[int]] = {}
     for at, column in enumerate(columns):
-        words = _words(column.name[:LONGEST_NAME], digits=True)
-        rest = [word for word in words if _QUANTITIES.get(word) != "time_s" and word != "t"]
-        if not 0 < len(rest) < len(words) or (column.unit is not None and not _measures("time_s", column.unit)):
+        all_words = words(column.name[:LONGEST_NAME], digits=True)
+        rest = [word for word in all_words if not of_time(word)]
+        if not 0 < len(rest) < len(all_words) or (column.unit is not None and not measures("time_s", column.unit)):
             continue
-        key, channel = "_".join(rest), meaning(" ".join(rest))
-        if channel[0] is None and key in _SYMBOLS and len(_SYMBOLS[key]) == 1:
-            channel = _SYMBOLS[key][0], Sense.WHOLE
+        named, channel = "_".join(rest), meaning(" ".join(rest))
+        if channel[0] is None and named in SYMBOLS and len(SYMBOLS[named]) == 1:
+            channel = SYMBOLS[named][0], Sense.WHOLE
         of = {
             other
             for other, own in enumerate(columns)
             if other != at
             and own.group == column.group
             and (
-                "_".join(_words(own.name[:LONGEST_NAME], digits=True)) == key
+                "_".join(words(own.name[:LONGEST_NAME], digits=True)) == named
                 or meaning(own.name, own.unit) == channel != (None, Sense.UNKNOWN)
             )
         }
@@ -470,7 +307,15 @@ def _clocks_by_name(columns: Sequence[FileColumn]) -> dict[int, frozenset[int]]:
 
 def may_be_time(column: FileColumn) -> bool:
     """Whether a column that is in a unit of time may be the clock, if its values run on as one."""
-    return meaning(column.name, column.unit)[1] is Sense.UNKNOWN and _measures("time_s", column.unit)
+    return meaning(column.name, column.unit)[1] is Sense.UNKNOWN and measures("time_s", column.unit)
+
+
+def like_a_time(column: FileColumn) -> bool:
+    """Whether a column may be the clock by its unit, by a word of another language, or by a part of its name."""
+    channel, sense = meaning(column.name, column.unit)
+    if column.unit is None and channel is None:
+        channel, sense = meaning(column.name, "s")
+    return may_be_time(column) or (channel == "time_s" and sense is not Sense.WHOLE)
 
 
 def no_unit(columns: Sequence[tuple[str, FileColumn]], reading: Reading) -> InvalidError:
@@ -492,9 +337,9 @@ def no_unit(columns: Sequence[tuple[str, FileColumn]], reading: Reading) -> Inva
 
 def _find(columns: Sequence[FileColumn], channel: str, name: str) -> int:
     """The index of the column that a map names: by its exact title or name, else whatever its case, blanks and unit."""
-    key, forms = _key(column_of(name).name), [(own.title, own.name, f"{own.group}/{own.name}") for own in columns]
+    wanted, forms = key(column_of(name).name), [(own.title, own.name, f"{own.group}/{own.name}") for own in columns]
     exact = [index for index, names in enumerate(forms) if name in names]
-    alike = [index for index, column in enumerate(columns) if _key(column.name) == key]
+    alike = [index for index, column in enumerate(columns) if key(column.name) == wanted]
     for matches in (exact, alike):
         if len(matches) == 1:
             return matches[0]
@@ -521,6 +366,13 @@ def several_times(shown: str) -> InvalidError:
     """The error of times in several columns."""
     message = f"time_s must be one column, got {shown}; choose one with time=NAME"
     return InvalidError.of(message, code="ambiguous", pointer="/time")
+
+
+def perhaps_the_time(column: FileColumn) -> InvalidError:
+    """The error of a column that may be the time, where nothing else is."""
+    title = column.title or column.shown()
+    message = f"{title} may be the time: add time={title} if it is; if each row is a plateau, add time={NO_TIME}"
+    return InvalidError.of(message, code="perhaps_the_time", pointer="/time", value=title)
 
 
 def _list(columns: Sequence[FileColumn]) -> str:
@@ -552,7 +404,7 @@ def _unit(channel: str, column: FileColumn, choice: ColumnChoice | None) -> str 
     A column that a map names may end in its unit, whatever parts them. Where a title says that its values are scaled, only
     the map says how.
     """
-    public = _key(column.name) == channel
+    public = key(column.name) == channel
     scaled = None if public else _SCALED.search(column.name[:LONGEST_NAME])
     asked_unit = None if choice is None else choice.unit
     if choice is not None and choice.column != column.title:
@@ -566,7 +418,7 @@ def _unit(channel: str, column: FileColumn, choice: ColumnChoice | None) -> str 
         rule = f"may contain a factor: state it with map={channel}:{column.name} {ways}"
         raise _wrong_unit(channel, column, "missing_unit", rule, "no clear one")
     if choice is None:
-        return "s" if column.unit is None and _key(column.name) in _SECONDS else column.unit
+        return "s" if column.unit is None and key(column.name) in _SECONDS else column.unit
     stated = column.unit or (None if public or scaled else unit_in_title(channel, column.name))
     differ = stated not in (None, choice.stated) and asked_unit and not scaled and is_unit(stated or "")
     if differ and conversion(channel, stated or "") != conversion(channel, asked_unit or ""):
@@ -584,7 +436,7 @@ def _conversion(channel: str, column: FileColumn, choice: ColumnChoice | None, u
 
     A column that a map names without a unit is in the channel's unit.
     """
-    channel_unit, public = CHANNELS[channel].unit, _key(column.name) == channel
+    channel_unit, public = CHANNELS[channel].unit, key(column.name) == channel
     converted = Conversion() if unit is None else conversion(channel, unit)
     if converted is None:
         rule = f"must be one of {spellings(channel)}"
@@ -599,6 +451,6 @@ def _conversion(channel: str, column: FileColumn, choice: ColumnChoice | None, u
 
 
 def _wrong_unit(channel: str, column: FileColumn, code: str, rule: str, got: str) -> InvalidError:
-    shown = channel if _key(column.name) == channel else f"{channel} (column {column.shown()!r})"
+    shown = channel if key(column.name) == channel else f"{channel} (column {column.shown()!r})"
     message = f"{shown}: the unit {rule}, got {got}"
     return InvalidError.of(message, code=code, pointer=f"/channels/{channel}", value=(column.unit or ""))

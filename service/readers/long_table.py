@@ -20,11 +20,12 @@ from service.readers.column_names import (
     choose,
     column_of,
     is_time,
-    known_channel,
+    perhaps_the_time,
     recognised,
     several_times,
 )
 from service.readers.limits import LIMITS
+from service.readers.meanings import Sense, known_channel, meaning
 from service.readers.numerals import NUMBER, plain, read_cells
 from service.readers.table import NO_MISSING, NO_TIME, Clock, FileColumn, Reading, Table, marks
 from service.readers.table_finder import is_value
@@ -182,6 +183,8 @@ def _time(columns: Sequence[FileColumn], reading: Reading) -> tuple[int, Any] | 
         raise several_times(shown)
     if not places:
         return None
+    if not named and meaning(columns[places[0]].name, columns[places[0]].unit) != ("time_s", Sense.WHOLE):
+        raise perhaps_the_time(columns[places[0]])
     taken = choose([columns[index] for index in places], Reading(mapping={"time_s": named} if named else {}))
     chosen, *_ = (column for column in taken if column.channel == "time_s")
     return places[chosen.index], chosen.conversion

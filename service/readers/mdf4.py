@@ -41,15 +41,17 @@ def read_table(path: Path, reading: Reading, limits: Limits) -> Table:
     places = list(_places(file, masters=masters, table=reading.table))
     limits.require_columns(len(places))
 
+    clocks: dict[int, FloatArray] = {}
+
     def read(taken: Mapping[int, str]) -> list[NDArray[Any]]:
-        return [_values(file, places[index], channel) for index, channel in taken.items()]
+        return _values(file, {places[index]: channel for index, channel in taken.items()}, clocks)
 
     notices = []
     if head.startswith(b"UnFinMF"):
         message = "the recorder did not close the MDF4 file: all rows up to its end were read"
         notices.append(Notice(code="not_finalised", message=message))
     several = len({group for group, _ in places}) > 1
-    columns = tuple(_column(file, group, index, several) for group, index in places)
+    columns = tuple(_column(file, group, index, several, clocks) for group, index in places)
     names = tuple(dict.fromkeys(_name(file, group) for group, _ in places))
     return Table(columns=columns, read=read, name=reading.table, others=names, notices=tuple(notices))
 
@@ -67,35 +69,44 @@ def _name(file: Any, group: int) -> str:
     return str(file.groups[group].channel_group.acq_name or f"group {group}")
 
 
-def _column(file: Any, group: int, index: int, several: bool) -> FileColumn:
+def _column(file: Any, group: int, index: int, several: bool, clocks: Mapping[int, FloatArray]) -> FileColumn:
     rows = int(file.groups[group].channel_group.cycles_nr)
     name = _name(file, group) if several else ""
     unit = file.get_channel_unit(group=group, index=index)
     channels = file.groups[group].channels
     column, master = column_of(channels[index].name, unit, name), file.masters_db.get(group)
     timed = master is not None and channels[master].sync_type not in _NO_TIMES
-    return replace(column, rows=rows, clock=Clock(group, partial(_times, file, group)) if timed else None)
+    return replace(column, rows=rows, clock=Clock(group, partial(_times, file, group, clocks)) if timed else None)
 
 
-def _times(file: Any, group: int) -> FloatArray:
-    """The times of a group [n] s. Raises InvalidError where their unit is not known."""
+def _times(file: Any, group: int, clocks: Mapping[int, FloatArray]) -> FloatArray:
+    """The times of a group [n] s, those that came with its values. Raises InvalidError where their unit is not known."""
     master = file.masters_db[group]
     _refuse_formula(file, group, master)
     unit = str(file.get_channel_unit(group=group, index=master) or "s")
     factor = in_seconds(1.0, unit, f"the times of {_name(file, group)}")
-    return factor * np.array(file.get_master(group), dtype=np.float64)
+    held = np.asarray(clocks[group] if group in clocks else file.get_master(group), dtype=np.float64)
+    return held if factor == 1 else factor * held
 
 
-def _values(file: Any, place: tuple[int, int], channel: str) -> NDArray[Any]:
-    """A channel's physical values, masked where its recorder marks them invalid."""
-    group, index = place
-    _refuse_formula(file, group, index)
-    signal = file.get(group=group, index=index, ignore_invalidation_bits=True)
-    rows = int(file.groups[group].channel_group.cycles_nr)
-    if len(signal.samples) != rows:
-        raise cut_short(f"{channel} has {len(signal.samples)} rows, and the file states {rows}")
-    samples, invalid = signal.samples, signal.invalidation_bits
-    return samples if invalid is None else np.ma.MaskedArray(samples, mask=np.asarray(invalid, dtype=np.bool_))
+def _values(file: Any, channels: Mapping[tuple[int, int], str], clocks: dict[int, FloatArray]) -> list[NDArray[Any]]:
+    """The physical values of channels by group and index, masked where their recorder marks them invalid; the groups' times
+    are put into `clocks`. Each group is gone through once."""
+    for group, index in channels:
+        _refuse_formula(file, group, index)
+    read = []
+    signals = file.select([(None, *place) for place in channels], copy_master=False)
+    for (place, channel), signal in zip(channels.items(), signals, strict=True):
+        rows = int(file.groups[place[0]].channel_group.cycles_nr)
+        if len(signal.samples) != rows:
+            raise cut_short(f"{channel} has {len(signal.samples)} rows, and the file states {rows}")
+        clocks[place[0]] = signal.timestamps
+        invalid = signal.invalidation_bits
+        masked = invalid is not None
+        read.append(
+            np.ma.MaskedArray(signal.samples, mask=np.asarray(invalid, dtype=np.bool_)) if masked else signal.samples
+        )
+    return read
 
 
 def _refuse_formula(file: Any, group: int, index: int) -> None:

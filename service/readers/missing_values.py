@@ -92,11 +92,12 @@ def refuse_stand_ins(name: str, values: NDArray[Any], line_of: LineOf | None, re
 def _stand_in(column: FloatArray, *, unbounded: bool) -> float | None:
     """A value of a column [n] that stands for none; `unbounded`: values may grow for as long as a record lasts, as times
     do."""
-    finite = np.isfinite(column)
-    finite_values = column if finite.all() else column[finite]
+    outermost = float(column.min(initial=np.inf)), float(column.max(initial=-np.inf))
+    finite_values = column if np.isfinite(outermost).all() else column[np.isfinite(column)]
     if finite_values.size < 2:
         return None
-    outermost = float(finite_values.min()), float(finite_values.max())
+    if finite_values is not column:
+        outermost = float(finite_values.min()), float(finite_values.max())
     usual = float(np.median(np.abs(finite_values[:: max(1, finite_values.size // _MAX_SAMPLED)])))
     if not any(map(_nines, outermost)) and max(map(abs, outermost)) < _FAR_NINES * usual:
         return None if unbounded else _jumped_to(finite_values, *outermost)  # no value is far off by any rule

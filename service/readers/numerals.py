@@ -282,7 +282,7 @@ _STAMP = re.compile(
     re.ASCII,
 )
 #: Dates that numpy may read: two dashes, and no zone behind them.
-_ISO = re.compile(r"(?:19|20)[^-+]*-[^-+]*-[^-+]*\d")
+_ISO = re.compile(r"(?:19|20)\d\d-\d\d-\d\d[T ][\d:.]*\d", re.ASCII)
 #: Durations by ISO 8601 (`PT0.01S`), as polars writes them.
 _DURATION = re.compile(
     r"(?P<sign>[+-]?)P(?:(?P<days>\d{1,6})D)?T(?=\d)(?:(?P<hours>\d{1,6})H)?(?:(?P<minutes>\d{1,6})M)?"

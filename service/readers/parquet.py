@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 
 from service.errors import MAX_QUOTED
 from service.readers.arrays import parsed, refuse_counts, stated_unit, unit_of_array
-from service.readers.column_names import column_of, known_channel
+from service.readers.column_names import column_of
 from service.readers.limits import Limits
+from service.readers.meanings import known_channel
 from service.readers.numerals import is_stamp
 from service.readers.table import FileColumn, Reading, Table
 

@@ -17,8 +17,8 @@ def preview(table: Table, reading: Reading) -> dict[str, Any]:
     """The table and its columns.
 
     `columns`: of each its `title`, the `unit` that the file states, the one `stated` by the caller's map, the `channel` that
-    it is taken for (null: left out), the unit that it is `read_in` (null: not known), and whether its title is understood
-    `in_part` only. `problem` says why the columns cannot be read so.
+    it is taken for (null: left out), and the unit that it is `read_in` (null: not known). `problem` says why the columns
+    cannot be read so.
     """
     try:
         table, reading = widened(stacked_columns(table, reading), reading)
@@ -26,7 +26,7 @@ def preview(table: Table, reading: Reading) -> dict[str, Any]:
         chosen, errors = understood(table.columns, reading)
     except InvalidError as error:
         chosen, errors = [], [error]
-    by_index = {column.index: column for column in chosen if not column.guessed or _differ(table, column.index)}
+    by_index = {column.index: column for column in chosen}
     stated_in_map = {channel: column_of(choice.column).unit for channel, choice in choices_of(reading).items()}
     columns = []
     for index, column in enumerate(table.columns):
@@ -40,7 +40,6 @@ def preview(table: Table, reading: Reading) -> dict[str, Any]:
                 "stated": None if chosen_here is None else stated_in_map.get(chosen_here.channel),
                 "channel": None if chosen_here is None else chosen_here.channel,
                 "read_in": None if chosen_here is None else chosen_here.unit,
-                "in_part": chosen_here is not None and chosen_here.in_part,
             }
         )
     return {
@@ -54,9 +53,3 @@ def preview(table: Table, reading: Reading) -> dict[str, Any]:
         "problem": errors[0].detail if errors else None,
         "notices": [asdict(notice) for notice in table.notices],
     }
-
-
-def _differ(table: Table, index: int) -> bool:
-    """Whether the first cells of a column differ, as times do."""
-    cells = [row[index] for row in table.head if index < len(row)]
-    return len(set(cells)) == len(cells)

@@ -16,6 +16,7 @@ from service.readers.column_names import parse_map
 from service.readers.detect import Format, members, opened, sniff, unpacked
 from service.readers.limits import LIMITS, Limits
 from service.readers.preview import preview
+from service.readers.suggest import Proposal, propose
 from service.readers.table import Reading, index_of_wanted
 from service.readers.text import read_text
 
@@ -46,12 +47,21 @@ def preview_file(
     return shown
 
 
+def suggest_file(path: Path, *, filename: str, reading: Reading, limits: Limits = LIMITS) -> Proposal | None:
+    """How a file that is not read without a question may be read (`suggest.propose`). Raises as `read_file` does."""
+    proposed: Proposal | None = _read(path, filename, reading, limits, "suggestion")
+    return proposed
+
+
 def _read(path: Path, filename: str, reading: Reading, limits: Limits, answer: sandbox.Answer) -> Any:
     kind = sniff(path, filename, limits)
     if kind is Format.ZIP:
         return _in_archive(path, reading, limits, answer)
     if kind is not Format.TEXT:
-        return sandbox.read_isolated(kind, path, answer, reading=reading, limits=limits)
+        return sandbox.read_isolated(kind, path, answer, reading=reading, limits=limits, filename=filename)
+    if answer == "suggestion":
+        text = partial(read_text, partial(opened, path, limits), limits=limits, any_encoding=True)
+        return propose(text, reading, limits, filename)
     table = read_text(partial(opened, path, limits), reading, limits)
     return preview(table, reading) if answer == "preview" else to_channels(table, reading, limits)
 
@@ -76,9 +86,12 @@ def _in_archive(path: Path, reading: Reading, limits: Limits, answer: sandbox.An
     refused: list[InvalidError] = []
     for name in names[:_MAX_TRIED]:
         try:
-            records[name] = read(name, reading.table)
+            found = read(name, reading.table)
+            records |= {name: found} if found else {}
         except InvalidError as error:
             refused.append(error)
     if not records and len(refused) == 1:
         raise refused[0]
+    if not records and answer == "suggestion":
+        return None
     return list(records.values())[index_of_wanted(list(records) or names, "", "file")]

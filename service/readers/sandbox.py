@@ -1,11 +1,12 @@
 """Formats with a library of their own are read in a process of their own, with limits on its memory, time, output and reach.
 
 The libraries are large, and a broken or malicious file may make them loop, exhaust memory or crash: that ends the reading
-process only. It loads its library first, and from then on it can open the file, our code and a folder of its own, and no
-socket (`confinement`). It returns one file: a line of JSON (the columns' lengths and notices, a preview, or an error), then
-the columns as raw little-endian float64. Nothing that came from the file is ever unpickled or evaluated.
+process only. It is a child of a process that has loaded the library (`zygote`); it can open the file, our code and a folder
+of its own, and no socket (`confinement`). It returns one file: a line of JSON (the columns' lengths and notices, a preview,
+or an error), then the columns as raw little-endian float64. Nothing that came from the file is ever unpickled or evaluated.
 """
 
+import contextlib
 import importlib
 import json
 import math
@@ -13,24 +14,28 @@ import os
 import re
 import resource
 import signal
-import subprocess
+import socket
 import sys
 import tempfile
 from collections.abc import Mapping
 from dataclasses import asdict
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, BinaryIO, Literal
 
 import numpy as np
 
+from models.arrays import FloatArray
 from service.channels import CHANNELS
 from service.errors import BusyError, FieldError, InvalidError, Notice, ServiceError, TooLargeError, exit_text
+from service.readers import zygote
 from service.readers.assemble import Channels, to_channels
 from service.readers.confinement import close_files, close_network_and_processes
 from service.readers.detect import Format, is_packed, opened, overdue, too_slow
 from service.readers.limits import Limits
 from service.readers.preview import preview
+from service.readers.suggest import Proposal, propose
 from service.readers.table import ColumnChoice, Reading
 
 #: The module that reads each format, the package it needs, and the extra of ours that installs it ("": always there).
@@ -44,24 +49,27 @@ READERS = {
 }
 
 #: What is asked of a file.
-Answer = Literal["channels", "preview"]
+Answer = Literal["channels", "preview", "suggestion"]
 #: Bytes of the line of JSON that the reading process answers with.
 _LONGEST_ANSWER = 1 << 20
 _BLOCK = 1 << 20
 #: What the reading process writes first, when its library is loaded.
 _STARTED = b"started\n"
+#: Columns begin at a multiple of so many bytes, where numbers are read fastest.
+_ALIGNED = 64
 #: Characters of a foreign library's message that ours quotes, and of a whole message.
 _MAX_QUOTED, _LONGEST_DETAIL = 200, 4000
 #: How C code ends on a file that it does not bear.
 _CRASHES = (signal.SIGSEGV, signal.SIGBUS, signal.SIGFPE, signal.SIGILL, signal.SIGABRT)
 #: Files that the reading process has open at once. Chosen: importing the libraries takes a dozen.
 _MAX_OPEN_FILES = 64
-#: Environment variables that the reading process gets; no others, so no keys.
-_ENVIRONMENT = ("PATH", "PYTHONPATH", "LANG", "LC_ALL", "LD_LIBRARY_PATH", "XDG_CACHE_HOME", "MPLCONFIGDIR")
 
 
-def read_isolated(kind: Format, path: Path, answer: Answer, *, reading: Reading, limits: Limits) -> Any:
-    """The channels [n] of a file in their own units (`channels.Channels`), or its preview, read in a process of its own.
+def read_isolated(
+    kind: Format, path: Path, answer: Answer, *, reading: Reading, limits: Limits, filename: str = ""
+) -> Any:
+    """The channels [n] of a file in their own units (`channels.Channels`), its preview or a suggestion, read in a process of
+    its own.
 
     What is unpacked is kept beside the file meanwhile.
     Raises InvalidError where the file cannot be read, or makes its reader crash or take too long; TooLargeError where it
@@ -71,12 +79,12 @@ def read_isolated(kind: Format, path: Path, answer: Answer, *, reading: Reading,
     if missing := not_installed(kind, f"this service cannot read {kind} files"):
         raise BusyError(missing, errors=[FieldError(pointer="", code="format_not_installed", message=missing)])
     if not is_packed(path):
-        return _run(kind, path, answer, reading, limits)
+        return _run(kind, path, answer, reading, limits, filename)
     with opened(path, limits) as source, tempfile.NamedTemporaryFile(dir=path.parent) as plain:
         while block := source.read(_BLOCK):
             plain.write(block)
         plain.flush()
-        return _run(kind, Path(plain.name), answer, reading, limits)
+        return _run(kind, Path(plain.name), answer, reading, limits, filename)
 
 
 def not_installed(kind: Format, consequence: str) -> str | None:
@@ -88,55 +96,41 @@ def not_installed(kind: Format, consequence: str) -> str | None:
     return f"{consequence}, because a library is missing. To install it where the service runs: {command}"
 
 
-def _run(kind: Format, path: Path, answer: Answer, reading: Reading, limits: Limits) -> Any:
+def _run(kind: Format, path: Path, answer: Answer, reading: Reading, limits: Limits, filename: str) -> Any:
     request = {
         "kind": kind,
         "path": str(path.resolve()),
+        "filename": filename,
         "answer": answer,
         "reading": asdict(reading),
         "limits": asdict(limits),
     }
-    environment = {name: os.environ[name] for name in _ENVIRONMENT if name in os.environ}
-    # Further threads would only reserve memory: the limit is on reserved memory.
-    environment |= {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "NUMEXPR_MAX_THREADS": "1"}
-    environment |= {"ARROW_DEFAULT_MEMORY_POOL": "system", "MALLOC_ARENA_MAX": "2", "PYTHONIOENCODING": "utf-8"}
     with (
         tempfile.TemporaryFile(dir=path.parent) as result,
         tempfile.TemporaryDirectory(prefix="reader-", dir=path.parent) as folder,
     ):
-        environment |= {"TMPDIR": folder, "HOME": folder}
-        arguments = [sys.executable, "-P", "-W", "ignore", "-m", "service.readers.sandbox", str(result.fileno())]
         try:
-            ended = subprocess.run(  # noqa: S603 (our own interpreter and module)
-                arguments,
-                input=json.dumps(request).encode(),
-                stdout=subprocess.DEVNULL,
-                stderr=subprocess.DEVNULL,
-                pass_fds=[result.fileno()],
-                env=environment,
-                timeout=limits.wall_seconds,
-                check=False,
-            )
-        except subprocess.TimeoutExpired:
+            ended = zygote.run(request | {"folder": folder}, result, limits.wall_seconds)
+        except TimeoutError:
             raise overdue(kind, limits) from None
         result.seek(0)
-        if result.read(len(_STARTED)) != _STARTED and ended.returncode != -signal.SIGTERM:
+        if result.read(len(_STARTED)) != _STARTED and ended != -signal.SIGTERM:
             raise BusyError(
-                f"the program that reads {kind} files could not start ({exit_text(ended.returncode)}). The file is not the "
+                f"the program that reads {kind} files could not start ({exit_text(ended)}). The file is not the "
                 "cause: send it again later. If this repeats, tell the operator of the service"
             )
-        if ended.returncode == -signal.SIGXCPU:
+        if ended == -signal.SIGXCPU:
             raise too_slow(kind, limits)
-        if ended.returncode == -signal.SIGTERM:
+        if ended == -signal.SIGTERM:
             raise BusyError("the service is shutting down: send the file again later")
-        if ended.returncode == -signal.SIGABRT and kind is Format.WORKBOOK:  # how a library in Rust ends without memory
+        if ended == -signal.SIGABRT and kind is Format.WORKBOOK:  # how a library in Rust ends without memory
             raise _too_much(kind)
-        if -ended.returncode in _CRASHES:  # in the C code of its library, which is what the process is for
-            crash = exit_text(ended.returncode)
+        if -ended in _CRASHES:  # in the C code of its library, which is what the process is for
+            crash = exit_text(ended)
             why = f"it is damaged or of another type (the library for it ended with {crash})"
             raise _unreadable(kind, why, "reader_crashed")
-        if ended.returncode:
-            raise _broken_off(kind, exit_text(ended.returncode))
+        if ended:
+            raise _broken_off(kind, exit_text(ended))
         return _answer(result, kind, answer, limits)
 
 
@@ -163,6 +157,13 @@ def _answer(result: BinaryIO, kind: Format, wanted: str, limits: Limits) -> Any:
             raise _error(answer["error"])
         if wanted == "preview":
             return dict(answer["preview"])
+        if wanted == "suggestion":
+            held = answer["suggestion"]
+            return held and Proposal(
+                reading=_reading(held["reading"]),
+                confidence=float(held["confidence"]),
+                titles=tuple(map(str, held["titles"])),
+            )
         lengths = {str(name): int(length) for name, length in answer["channels"].items()}
         notices = tuple(Notice(code=str(item["code"]), message=str(item["message"])) for item in answer["notices"])
         counts = bool(answer["counts"])
@@ -171,11 +172,25 @@ def _answer(result: BinaryIO, kind: Format, wanted: str, limits: Limits) -> Any:
         raise _broken_off(kind, "no answer") from None
     if not lengths.keys() <= CHANNELS.keys() or not 0 <= sum(lengths.values()) <= limits.most_values:
         raise _broken_off(kind, "no answer")
-    columns = {name: np.empty(max(0, length)) for name, length in lengths.items()}
-    for column in columns.values():
-        if result.readinto(column.data) != column.nbytes:  # type: ignore[attr-defined]
-            raise _broken_off(kind, "no answer")
+    values = _mapped(result, kind, sum(lengths.values()))
+    ends = np.cumsum([*lengths.values()])
+    columns = dict(zip(lengths, np.split(values, ends[:-1]), strict=True))
     return Channels(columns=columns, notices=notices, counts=counts, labels=labels)
+
+
+def _mapped(result: BinaryIO, kind: Format, size: int) -> FloatArray:
+    """The numbers [size] from the present place of the answer on: the file itself, whose pages are copied where they
+    change."""
+    offset, end = result.tell(), result.seek(0, os.SEEK_END)
+    if size <= 0 or offset % _ALIGNED or end < offset + 8 * size:
+        raise _broken_off(kind, "no answer")
+    return np.memmap(result, dtype="<f8", mode="c", offset=offset, shape=(size,)).view(np.ndarray)
+
+
+def _reading(held: Mapping[str, Any]) -> Reading:
+    """A reading as JSON has it."""
+    mapping = {name: ColumnChoice(**choice) for name, choice in held["mapping"].items()}
+    return Reading(**{**held, "mapping": mapping, "left_out": list(held["left_out"])})
 
 
 def _error(answer: Mapping[str, Any]) -> ServiceError:
@@ -188,12 +203,25 @@ def _error(answer: Mapping[str, Any]) -> ServiceError:
 
 
 def main() -> None:
-    """Read the file that standard input names; write the answer to the open file whose number is the first argument."""
-    request = json.load(sys.stdin)
+    """Divide for each file that the socket with the number of the first argument asks for."""
+    with socket.socket(fileno=int(sys.argv[1])) as control:
+        zygote.serve(control, _load, _read)
+
+
+def _load(request: Mapping[str, Any]) -> None:
+    """The module that reads a format, kept for further files; what keeps it from loading is the child's to say."""
+    with contextlib.suppress(Exception):
+        importlib.import_module(READERS[Format(request["kind"])][0])
+
+
+def _read(request: Mapping[str, Any], answer: int) -> None:
+    """In a child: read the file that is asked for, and write the answer to the open file `answer`."""
+    sys.argv[1:] = [str(answer)]
+    os.environ.update({"TMPDIR": request["folder"], "HOME": request["folder"]})
+    tempfile.tempdir = request["folder"]
     kind, path, limits = Format(request["kind"]), Path(request["path"]), Limits(**request["limits"])
-    mapping = {name: ColumnChoice(**choice) for name, choice in request["reading"]["mapping"].items()}
-    reading = Reading(**request["reading"] | {"mapping": mapping})
-    with os.fdopen(int(sys.argv[1]), "wb") as result:
+    reading = _reading(request["reading"])
+    with os.fdopen(answer, "wb") as result:
         # whatever it loads, and asks of the system, before the doors close
         reader = importlib.import_module(READERS[kind][0])
         close_files(readable=[path], writable=[Path(tempfile.gettempdir())])
@@ -202,11 +230,14 @@ def main() -> None:
         result.write(_STARTED)
         result.flush()
         try:
-            table = reader.read_table(path, reading, limits)
-            if request["answer"] == "preview":
-                _write(result, {"preview": preview(table, reading)})
+            read_table = partial(reader.read_table, path, limits=limits)
+            if request["answer"] == "suggestion":
+                proposed = propose(read_table, reading, limits, request["filename"])
+                _write(result, {"suggestion": proposed and asdict(proposed)})
+            elif request["answer"] == "preview":
+                _write(result, {"preview": preview(read_table(reading), reading)})
             else:
-                _write_channels(result, to_channels(table, reading, limits))
+                _write_channels(result, to_channels(read_table(reading), reading, limits))
         except ServiceError as error:
             _write_error(result, error)
         except MemoryError:
@@ -223,7 +254,8 @@ def _write_channels(result: BinaryIO, channels: Channels) -> None:
         "counts": channels.counts,
         "labels": dict(channels.labels),
     }
-    _write(result, answer)
+    line = json.dumps(answer).encode()
+    result.write(line + b" " * (-(len(_STARTED) + len(line) + 1) % _ALIGNED) + b"\n")
     for column in channels.columns.values():
         result.write(np.ascontiguousarray(column, dtype="<f8").data)
 

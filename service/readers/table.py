@@ -45,15 +45,16 @@ class ColumnChoice:
 class Reading:
     """How to read a file; empty where the file says it all. A rig profile keeps one.
 
-    `mapping`: channel -> its column; `only_named`: no other column is taken. `table`: the sheet, group or archived file.
-    `time`: the title of the time column, or NO_TIME. `decimal`: the decimal sign, "." or ",". `skip_rows`: lines above that
-    are not looked at. `missing`: marks of values that are missing, such as `-9999,n/a`; where any is given, rows without a
-    value are left out; NO_MISSING: every number is a measurement. `good`: codes of a column of qualities that mark good
-    rows, such as `0` or `192`; NO_MISSING: all rows are read.
+    `mapping`: channel -> its column; `only_named`: no other column is taken. `left_out`: titles that are left out on
+    purpose. `table`: the sheet, group or archived file. `time`: the title of the time column, or NO_TIME. `decimal`: the
+    decimal sign, "." or ",". `skip_rows`: lines above that are not looked at. `missing`: marks of values that are missing,
+    such as `-9999,n/a`; where any is given, rows without a value are left out; NO_MISSING: every number is a measurement.
+    `good`: codes of a column of qualities that mark good rows, such as `0` or `192`; NO_MISSING: all rows are read.
     """
 
     mapping: Mapping[str, ColumnChoice] = field(default_factory=dict)
     only_named: bool = False
+    left_out: Sequence[str] = field(default_factory=list)
     table: str = ""
     time: str = ""
     decimal: str = ""
@@ -132,7 +133,7 @@ def labels(above: Sequence[Sequence[str]]) -> dict[str, str]:
         cells = [cell for cell in row if cell]
         if len(cells) == 1:
             cells = [part.strip() for part in re.split(r"[:=]", cells[0], maxsplit=1)]
-        if len(cells) > 1:
+        if len(cells) > 1 and cells[1]:
             values_by_label.setdefault(cells[0][:MAX_QUOTED], cells[1][:MAX_QUOTED])
     return values_by_label
 
@@ -152,7 +153,7 @@ def index_of_wanted(names: Sequence[str], wanted: str, kind: str) -> int:
     shown = ", ".join(repr(name[:MAX_QUOTED]) for name in names[:10]) + (" ..." if len(names) > 10 else "")
     missing = f"has no {kind} {wanted[:MAX_QUOTED]!r}" if wanted else f"holds {len(names)} {kind}s with channels"
     message = f"the file {missing}: choose one with table=NAME, from {shown}"
-    raise InvalidError.of(message, code="which_table", pointer="/table")
+    raise InvalidError.of(message, code="which_table", pointer="/table", value=names[0] if names else "")
 
 
 def cut_short(defect: str) -> InvalidError:

@@ -12,8 +12,9 @@ from itertools import pairwise, zip_longest
 from typing import Any
 
 from service.errors import MAX_QUOTED, InvalidError, Notice
-from service.readers.column_names import bare_unit, column_of, is_counter, known_channel, recognised, with_unit
+from service.readers.column_names import bare_unit, column_of, is_counter, recognised, with_unit
 from service.readers.limits import LONGEST_TITLE, LONGEST_UNIT
+from service.readers.meanings import known_channel
 from service.readers.numerals import NUMBER, Stamps, is_stamp, with_unit_apart
 from service.readers.stated_clocks import stated_clock
 from service.readers.table import FileColumn, Table, labels
@@ -295,7 +296,7 @@ def _layout(
     for place, at in enumerate(above):
         for titles in _titles(rows, above[place:], width, data):
             filled = sum(map(bool, titles))
-            channel_count = recognised(titles, named)
+            channel_count = 0 if _are_units(titles) else recognised(titles, named)  # `rpm` is both
             enough = filled >= width if at in comments else filled >= min(2, width) or channel_count
             rank = (
                 channel_count,

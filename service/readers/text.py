@@ -14,18 +14,19 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
+from itertools import islice
 from typing import Any, NamedTuple
 
 import numpy as np
 import pydantic_core
 from numpy.typing import NDArray
 
-from models.arrays import FloatArray
 from service.errors import MAX_ERRORS, MAX_QUOTED, FieldError, InvalidError, Notice, TooLargeError
 from service.readers.column_names import named_columns, recognised
 from service.readers.detect import BINARY, ByteSource, Format, overdue, too_slow, utf_16
 from service.readers.limits import LIMITS, LONGEST_LINE_BYTES, Limits
 from service.readers.numerals import Numerals, is_stamp
+from service.readers.plain_numbers import plain_columns
 from service.readers.table import Reading, Table
 from service.readers.table_finder import (
     MAX_ROWS,
@@ -39,19 +40,28 @@ from service.readers.table_finder import (
     turned,
 )
 
-#: Bytes of a block; the first must hold the titles. Chosen: rows that are no plain numbers take 60 times as much memory.
-_BLOCK = 1 << 17
+#: Bytes of the beginning, which must hold the titles, and of a piece of rows that are no plain numbers, which take 60 times
+#: as much memory; and of a block of rows. Chosen: a quarter of it takes 1.2 times as long.
+_HEAD, _BLOCK = 1 << 17, 1 << 19
+#: Rows that are looked at at once for the decimal sign. Chosen: the first one mostly shows it.
+_SETTLED = 64
 _COMMENTS = ("#", "%", "//")
 _NEWLINE, _COMMA = b"\n,"
 _SEPARATOR_LINE = re.compile(r"\s*sep=(.?)\s*", re.IGNORECASE)
-#: Encodings that are tried where text is not UTF-8; of those that read as many titles the first.
-_ENCODINGS = ("cp1252", "cp1250", "cp1254", "gb18030", "shift_jis", "euc_jp", "big5", "euc_kr", "cp1251")
+#: The encoding of text that is not UTF-8; and others that are tried for titles that the caller names, or for a suggestion:
+#: of those that read as many titles the first.
+_WESTERN = ("cp1252",)
+_OTHERS = ("cp1250", "cp1254", "gb18030", "shift_jis", "euc_jp", "big5", "euc_kr", "cp1251")
+#: Titles that are known in Western text, from which on no other encoding is tried. Chosen: of the four that a test has.
+_CLEAR = 3
 #: Pairs of bytes as Chinese text has them, and single ones as Western text has them.
 _CHINESE = re.compile(rb"(?:[\x00-\x7f]|[\xa1-\xf7][\xa1-\xfe])*")
 #: Cells of which the last is in quotes and goes on; a quotation mark within a cell is no other (3/4").
 _OPEN = re.compile(r'(?:(?:[ \t]*"(?:[^"]|"")*+"[^;,\t|\n]*|(?![ \t]*")[^;,\t|\n]*)[;,\t|\n])*+[ \t]*"(?:[^"]|"")*+')
 #: What is neither in numbers nor in points in time.
 _WORDS = re.compile(r"[^\d \n.,;:|\teETZ/+-]")
+#: The share of lines with a tab of a text that tabs separate. Chosen: title blocks have none.
+_MOST_OF = 0.8
 #: Lines that one cell in quotes may go over.
 _MAX_CELL_LINES = 5
 
@@ -76,23 +86,24 @@ class _Form:
         return self.lines[self.layout.start] if self.layout.start < len(self.lines) else self.lines[-1] + 1
 
 
-def read_text(opened: Open, reading: Reading, limits: Limits) -> Table:
-    """The table of a text. Raises InvalidError where it has no titles, or its lines are no text."""
+def read_text(opened: Open, reading: Reading, limits: Limits, *, any_encoding: bool = False) -> Table:
+    """The table of a text, which is UTF-8, UTF-16 or Western, or of another encoding if the caller names its titles or takes
+    `any_encoding`. Raises InvalidError where it has no titles, or its lines are no text."""
     with opened() as source:
-        first = source.read(_BLOCK)
-    whole = len(first) < _BLOCK
+        first = source.read(_HEAD)
+    whole = len(first) < _HEAD
     if not whole and b"\n" in first and b"\0" not in first:  # whole lines alone; with zeros it may be UTF-16
         first = first[: first.rindex(b"\n") + 1]
     if not first.strip():
         rule = "is empty, and so is the rest of the file: send a file with a header and rows of numbers"
         raise wrong_line(1, rule, "no_header")
     try:
-        form = _form(first, reading, limits)
+        form = _form(first, reading, limits, any_encoding=any_encoding or bool(named_columns(reading)))
     except InvalidError:
         if (on_its_side := _turned(first, reading)) is None:
             raise
         if not whole:
-            message = f"a table on its side must have less than {_BLOCK} bytes: send it with a column a channel"
+            message = f"a table on its side must have less than {_HEAD} bytes: send it with a column a channel"
             raise TooLargeError(message) from None
         table = read_text(lambda: nullcontext(io.BytesIO(on_its_side)), reading, limits)
         return replace(table, notices=[*table.notices, TURNED])
@@ -177,13 +188,14 @@ def _zeros_amid(line: int, tail: str) -> InvalidError:
     return wrong_line(line, rule, "not_text")
 
 
-def _encodings(head: bytes) -> list[str]:
+def _encodings(head: bytes, *, any_encoding: bool) -> list[str]:
     """The encodings that a text may be in, likeliest first."""
     if wide := utf_16(head):
         return [wide]
     if _decodes(head, "utf-8"):
         return ["utf-8"]
-    encodings = [name for name in _ENCODINGS if _decodes(head, name)] or ["latin-1"]
+    tried = (*_WESTERN, *_OTHERS) if any_encoding else _WESTERN
+    encodings = [name for name in tried if _decodes(head, name)] or ["latin-1"]
     return sorted(encodings, key=lambda name: name != "gb18030") if _CHINESE.fullmatch(head) else encodings
 
 
@@ -198,12 +210,12 @@ def _decodes(head: bytes, encoding: str) -> bool:
 # --- lines -> the table ---
 
 
-def _form(first: bytes, reading: Reading, limits: Limits) -> _Form:
+def _form(first: bytes, reading: Reading, limits: Limits, *, any_encoding: bool) -> _Form:
     """The encoding, the separator and the table by which most titles are known."""
     best: _Form | None = None
     named = named_columns(reading)
     unfit: list[list[str]] = []
-    for encoding in _encodings(first):
+    for encoding in _encodings(first, any_encoding=any_encoding):
         text = _lines(first, encoding)[: reading.skip_rows + MAX_ROWS]
         for separator in _separators(text[reading.skip_rows :]):
             numbered = [*_rows(text, separator, reading.skip_rows)]
@@ -214,7 +226,8 @@ def _form(first: bytes, reading: Reading, limits: Limits) -> _Form:
             if layout is not None and (best is None or layout.fit() > best.layout.fit()):
                 lines = [line + 1 for line, _, _ in numbered]
                 best = _Form(encoding=encoding, separator=separator, layout=layout, rows=rows, lines=lines)
-        if best is not None and encoding.startswith("utf"):
+        clear = encoding.startswith("utf") or (encoding in _WESTERN and best and best.layout.score[0] >= _CLEAR)
+        if best is not None and clear:
             break
     if best is None:
         raise no_table(unfit, named)
@@ -230,7 +243,7 @@ def _lines(block: bytes, encoding: str) -> list[str]:
 
 def _turned(first: bytes, reading: Reading) -> bytes | None:
     """A whole text whose lines are channels with its lines as columns, by the separator by which it is a table then."""
-    text = _lines(first, _encodings(first)[0])[reading.skip_rows :]
+    text = _lines(first, _encodings(first, any_encoding=False)[0])[reading.skip_rows :]
     for separator in _separators(text):
         rows = [cells for _, cells, _ in _rows(text, separator) if any(cells)]
         if on_its_side := turned(rows, named_columns(reading)):
@@ -247,7 +260,9 @@ def _separators(lines: Sequence[str]) -> list[str]:
     if stated := next(filter(None, map(_SEPARATOR_LINE.fullmatch, lines)), None):
         return [stated[1] or "\t"]
     present = [separator for separator in "\t;,|" if any(separator in line for line in lines)]
-    return [*present, "  ", " "] if any(" " in line.strip() for line in lines) else present or [","]
+    tabbed = sum("\t" in line for line in lines) > _MOST_OF * len([line for line in lines if line.strip()])
+    blanks = any(" " in line.strip() for line in lines) and not tabbed  # then blanks are within titles
+    return [*present, "  ", " "] if blanks else present or [","]
 
 
 def _rows(lines: Sequence[str], separator: str, skipped: int = 0) -> Iterator[tuple[int, list[str], bool]]:
@@ -355,16 +370,10 @@ class _DataBody:
                 line = self._line + block.count("\n") - 1
                 message = f"left out: {zeros} zero bytes after line {line}, as a logger leaves where power was lost"
                 self.data.notices.append(Notice(code="lines_left_out", message=message))
-            numbers = None if dated else self._plain(block)
-            if numbers is None:
-                columns = self._careful(block, channels, last)
-            else:
-                self._lines.append((self.rows, range(self._line, self._line + len(numbers))))
-                columns = [numbers[:, index].copy() for index in channels]
-            self._line += block.count("\n")
-            for part, column in zip(parts, columns, strict=True):
-                part.append(column)
-            self.rows += columns[0].size
+            for columns in self._columns(block, channels, last=last, dated=dated):
+                for part, column in zip(parts, columns, strict=True):
+                    part.append(column)
+                self.rows += columns[0].size
             if self.rows > most:
                 rule = f"must not have more than {most} rows"
                 raise TooLargeError(f"a file of {len(channels)} channels {rule}: send it in parts")
@@ -375,6 +384,23 @@ class _DataBody:
             masked = any(isinstance(values, np.ma.MaskedArray) for values in part)
             joined.append((np.ma.concatenate if masked else np.concatenate)(part))
         return joined
+
+    def _columns(
+        self, block: str, channels: Mapping[int, str], *, last: bool, dated: bool
+    ) -> Iterator[list[NDArray[Any]]]:
+        """The columns of a block of plain numbers, or of each piece of any other one."""
+        columns = None if dated else self._plain(block, channels)
+        if columns is not None:
+            self._lines.append((self.rows, range(self._line, self._line + columns[0].size)))
+            self._line += columns[0].size
+            yield columns
+            return
+        start = 0
+        while start < len(block):
+            end = len(block) if '"' in block else block.find("\n", min(start + _HEAD, len(block) - 1)) + 1
+            piece, start = block[start:end], end
+            yield self._careful(piece, channels, last and end == len(block))
+            self._line += piece.count("\n")
 
     def _blocks(self) -> Iterator[_Block]:
         """The blocks from the first row of data on."""
@@ -414,12 +440,17 @@ class _DataBody:
             if self._numerals.decimal:
                 return
             if "." in block or ("," in block and (self._separator != "," or '"' in block)):
-                rows = [cells for _, cells, _ in self._parsed(block) if len(cells) > max(channels)]
-                doubtful |= self._numerals.settle([[row[at] for row in rows] for at, name in channels.items() if name])
+                parsed = (cells for _, cells, _ in self._parsed(block) if len(cells) > max(channels))
+                while rows := list(islice(parsed, _SETTLED)):
+                    shown = [[row[at] for row in rows] for at, name in channels.items() if name]
+                    doubtful |= self._numerals.settle(shown)
+                    if self._numerals.decimal:
+                        return
         self._numerals.decimal = self._numerals.decimal or ("" if doubtful else ".")
 
-    def _plain(self, block: str) -> FloatArray | None:
-        """A block of nothing but numbers [rows, columns], by jiter (pydantic-core's reader of JSON); None for any other."""
+    def _plain(self, block: str, channels: Mapping[int, str]) -> list[NDArray[Any]] | None:
+        """The columns of a block of nothing but numbers: plain ones eight digits at a time, others by jiter (pydantic-core's
+        reader of JSON); None for any other block."""
         separator, decimal = self._separator, self._numerals.decimal
         if not decimal or (separator != "," and decimal == "." and "," in block):
             return None
@@ -428,6 +459,8 @@ class _DataBody:
         if decimal == ",":
             block = "" if "." in block else block.replace(",", ".")
         plain = block.replace(separator, ",").encode()
+        if (columns := plain_columns(plain, self._width, channels)) is not None:
+            return columns
         if not plain or plain.translate(None, b"0123456789.eE+-,\n"):
             return None
         letters = np.frombuffer(plain, np.uint8)
@@ -436,9 +469,10 @@ class _DataBody:
             return None  # not as many cells in each line
         try:
             cells = pydantic_core.from_json(b"[%b]" % plain[:-1].replace(b"\n", b","))
-            return np.array(cells, dtype=np.float64).reshape(-1, self._width)
+            numbers = np.array(cells, dtype=np.float64).reshape(-1, self._width)
         except (ValueError, OverflowError):
             return None
+        return [numbers[:, index].copy() for index in channels]
 
     def _parsed(self, block: str) -> Iterator[tuple[int, list[str], bool]]:
         return _rows(block.split("\n")[:-1], self._separator)

@@ -54,15 +54,16 @@ _PRESSURE = {
     1 / PASCALS_PER_BAR: "Pa N/m2 pascal",
     1e3 / PASCALS_PER_BAR: "kPa кПа 千帕 kN/m2",
     1e4 / PASCALS_PER_BAR: "N/cm2",
-    1e6 / PASCALS_PER_BAR: "MPa N/mm2 MN/m2 МПа 兆帕",
+    1e6 / PASCALS_PER_BAR: "MPa N/mm2 Nmm2 MN/m2 МПа 兆帕",
     _PASCALS_PER_PSI / PASCALS_PER_BAR: "psi psig lbf/in2 lb/in2",
     1e3 * _PASCALS_PER_PSI / PASCALS_PER_BAR: "ksi",
     101_325 / 760 / PASCALS_PER_BAR: "Torr mmHg",
     _NEWTONS_PER_KILOPOND * 1e4 / PASCALS_PER_BAR: "kgf/cm2 kg/cm2 kp/cm2 кгс/см2",
 }
 _SPEED = {
-    1.0: "rpm 1/min min-1 /min U/min r/min rmin-1 rev/min revmin-1 Upm Umdr/min revolutions/min tr/min trs/min tr/mn "
-    "giri/min obr/min ot/min varv/min omw/min dev/dak dev/dk d/dak d/dk об/мин мин-1 转/分 转/分钟 轉/分 回転/分 回/分",
+    1.0: "rpm 1/min 1min Umin min-1 /min U/min r/min rmin-1 rev/min revmin-1 Upm Umdr/min revolutions/min tr/min trs/min "
+    "tr/mn giri/min obr/min ot/min varv/min omw/min dev/dak dev/dk d/dak d/dk об/мин мин-1 转/分 转/分钟 轉/分 "
+    "回転/分 回/分",
     1e3: "krpm 1000/min",
     60.0: "U/s r/s rev/s revs/sec rps tr/s об/с 转/秒 Hz",
     1 / RADIANS_PER_SECOND_PER_RPM: "rad/s rad/sec rads rads-1 radps рад/с 弧度/秒",

@@ -1,7 +1,7 @@
 """What a rig profile says of a file besides its columns: kind, cycles and name of its run, from the file's name or a cell.
 
-A pattern of names has `{cycles}` (a whole number, `7k` for 7,000), `{kind}` (a word that the profile explains), `{run_id}`
-and `*`; everything else stands for itself, whatever its case.
+A pattern of names has `{cycles}` (a whole number, `7k` for 7,000), `{kind}` (a word that the profile explains), `{run_id}`,
+`{clutch_id}` and `*`; everything else stands for itself, whatever its case.
 """
 
 import re
@@ -17,11 +17,12 @@ from service.readers.unit_table import conversion, spellings
 
 #: Places of a pattern that stand for something. Chosen: names of rigs have the cycles, a kind, a number, and a rest.
 _MAX_WILD = 4
-_WILD = re.compile(r"\{cycles\}|\{kind\}|\{run_id\}|\*")
+_WILD = re.compile(r"\{cycles\}|\{kind\}|\{run_id\}|\{clutch_id\}|\*")
 _MEANING = {
     "{cycles}": r"(?P<cycles>\d{1,12}k?)(?!\d)",
     "{kind}": r"(?P<kind>[^\d\W_]+)",
     "{run_id}": r"(?P<run_id>[A-Za-z0-9][A-Za-z0-9._:@+-]{0,127}?)",
+    "{clutch_id}": r"(?P<clutch_id>[A-Za-z0-9][A-Za-z0-9._:@+-]{0,127}?)",
     "*": r".*?",
 }
 _NUMBER = re.compile(r"\d+(?:[.,' ]\d{3})*")
@@ -34,6 +35,7 @@ class Named:
     kind: FileKindName | None = None
     cycles: float | None = None
     run_id: str | None = None
+    clutch_id: str | None = None
 
 
 def require_usable(profile: RigProfile) -> None:
@@ -51,7 +53,7 @@ def require_usable(profile: RigProfile) -> None:
     if len(places) > _MAX_WILD:
         rule = f"may hold at most {_MAX_WILD} of {', '.join(_MEANING)}"
     elif any(places.count(name) > 1 for name in _MEANING if name != "*"):
-        rule = "may hold each of {cycles}, {kind} and {run_id} once"
+        rule = "may hold each of {cycles}, {kind}, {run_id} and {clutch_id} once"
     elif "{kind}" in places and not profile.kinds:
         rule = "has {kind}, so `kinds` must list the words for each kind of run"
     if rule is not None:
@@ -66,24 +68,43 @@ def named(profile: RigProfile, filename: str, cells: Mapping[str, str]) -> Named
         match = _regex(profile.file_name).fullmatch(PurePath(filename).name)
         groups = {} if match is None else match.groupdict()
     words = {word.casefold(): kind for word, kind in profile.kinds.items()}
-    cycles = _count(groups.get("cycles"))
+    cycles, clutch_id = count(groups.get("cycles")), groups.get("clutch_id")
     if cycles is None and profile.cycles_cell is not None:
-        label_texts = {label.strip().rstrip(":=").strip().casefold(): text for label, text in cells.items()}
-        cycles = _count(label_texts.get(profile.cycles_cell.strip().rstrip(":=").strip().casefold()))
+        cycles = count(_beside(profile.cycles_cell, cells))
+    if clutch_id is None and profile.clutch_cell is not None:
+        clutch_id = _beside(profile.clutch_cell, cells)
     return Named(
-        kind=words.get((groups.get("kind") or "").casefold(), profile.kind), cycles=cycles, run_id=groups.get("run_id")
+        kind=words.get((groups.get("kind") or "").casefold(), profile.kind),
+        cycles=cycles,
+        run_id=groups.get("run_id"),
+        clutch_id=clutch_id,
     )
 
 
-def pattern_for(filename: str, cycles: float | None) -> str | None:
-    """A pattern of names such as this one: the cycles where they stand in it once, and `*` for every other number.
+def _beside(label: str, cells: Mapping[str, str]) -> str | None:
+    """What stands beside a label above the table."""
+    texts = {_bare(own): text for own, text in cells.items()}
+    return texts.get(_bare(label))
+
+
+def _bare(label: str) -> str:
+    return label.strip().rstrip(":=").strip().casefold()
+
+
+def pattern_for(filename: str, cycles: float | None, clutch_id: str | None = None) -> str | None:
+    """A pattern of names such as this one: the cycles and the clutch where they stand in it once, and `*` for every other
+    number.
 
     None where the cycles are not in the name.
     """
     if cycles is None or not cycles.is_integer():
         return None
     digits, thousands = str(int(cycles)), f"{int(cycles) // 1000}k" if cycles and cycles % 1000 == 0 else None
-    parts = re.split(r"(\d+k?(?![^\W\d_]))", PurePath(filename).name, flags=re.IGNORECASE)
+    name = PurePath(filename).name
+    if clutch_id and name.count(clutch_id) == 1:
+        before, _, after = name.partition(clutch_id)
+        name = f"{before}{{clutch_id}}{after}"
+    parts = re.split(r"(\d+k?(?![^\W\d_]))", name, flags=re.IGNORECASE)
     numbers = range(1, len(parts), 2)
     as_digits = [place for place in numbers if parts[place].lstrip("0") == digits.lstrip("0")]
     places = as_digits + [place for place in numbers if parts[place].casefold() == thousands]
@@ -107,7 +128,7 @@ def _regex(pattern: str) -> re.Pattern[str]:
     return re.compile("".join(parts), re.IGNORECASE)
 
 
-def _count(text: str | None) -> float | None:
+def count(text: str | None) -> float | None:
     """A whole number of cycles, with thousands grouped or as `7k`; None where the text is none."""
     plain = (text or "").strip()
     times = 1000.0 if plain[-1:].casefold() == "k" else 1.0

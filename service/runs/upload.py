@@ -1,22 +1,19 @@
 """A run posted as a file -> `IncomingRun`: the file holds the channels, the request or the rig's profile everything else."""
 
-from collections.abc import Mapping
 from dataclasses import asdict, replace
 from datetime import datetime
 from pathlib import Path
 
-from models.arrays import FloatArray
-from models.records.cleaning import UnusableRecordError
-from models.records.plateaus import cut_plateaus
 from service.api.base import Origin
-from service.api.rig import RigProfile
+from service.api.rig import FileKindName, RigProfile
 from service.channels import PLATE_TEMPERATURES, check_columns
-from service.clutch.incoming_run import IncomingRun, SampledChannels, name_run
+from service.clutch.incoming_run import IncomingRun, name_run
 from service.errors import FieldError, InvalidError, Notice
 from service.readers.assemble import LEFT_OUT, Channels
 from service.readers.read_file import read_file
 from service.readers.table import ColumnChoice, Reading
 from service.runs.rig_profile import Named, named
+from service.runs.suggestion import holds_no_dwell, suggestion_of
 
 #: The channels that each kind of run must have, and the channels that it may have.
 NEEDED = {
@@ -33,7 +30,7 @@ def read_file_run(
     path: Path,
     *,
     filename: str,
-    kind: str | None,
+    kind: FileKindName | None,
     cycles: float | None,
     run_id: str | None = None,
     started_at: datetime | None = None,
@@ -44,9 +41,39 @@ def read_file_run(
 ) -> IncomingRun:
     """The run in a file, read by a profile, the stored one of `rig`, where one is given; what is given beside it wins.
 
-    Raises InvalidError or TooLargeError naming what is wrong.
+    Raises InvalidError or TooLargeError naming what is wrong; without a profile the former has a suggestion, if there is
+    one.
     """
     reading = reading_with(profile, reading or Reading())
+    try:
+        return _read_run(path, filename, kind, cycles, run_id, started_at, origin, reading, profile, rig)
+    except InvalidError as error:
+        if profile is None:
+            error.suggestion = suggestion_of(
+                path, filename=filename, reading=reading, kind=kind, cycles=cycles, why=error.detail
+            )
+        if error.suggestion is not None:
+            error.detail += ". A reading is suggested: confirm it, or send the file with the right one"
+        raise
+
+
+def file_kind(kind: str) -> FileKindName:
+    """The kind of a stored run that was a file."""
+    return "dynamic_stribeck" if kind == "dynamic_stribeck" else "stationary_stribeck"
+
+
+def _read_run(
+    path: Path,
+    filename: str,
+    kind: FileKindName | None,
+    cycles: float | None,
+    run_id: str | None,
+    started_at: datetime | None,
+    origin: Origin,
+    reading: Reading,
+    profile: RigProfile | None,
+    rig: str | None,
+) -> IncomingRun:
     read = read_file(path, filename=filename, reading=reading)
     stated = Named() if profile is None else named(profile, filename, read.labels)
     kind, cycles = kind or stated.kind, stated.cycles if cycles is None else cycles
@@ -81,7 +108,7 @@ def run_of(read: Channels, head: IncomingRun) -> IncomingRun:
         if left_out := next((notice.message for notice in notices if notice.code == LEFT_OUT), ""):
             message += f"; {left_out}; choose one of them with map={missing[0]}:NAME"
         raise InvalidError(message, errors=errors)
-    if kind == "stationary_stribeck" and read.counts and _holds_no_dwell(columns):
+    if kind == "stationary_stribeck" and read.counts and holds_no_dwell(columns):
         message = (
             "the times in the file only count the rows, so each row was read as a plateau. If the rows are samples, send "
             "the samples' times"
@@ -110,18 +137,10 @@ def reading_with(profile: RigProfile | None, reading: Reading) -> Reading:
         reading,
         mapping=reading.mapping or choices,
         only_named=not reading.mapping,
+        left_out=[own.title for own in profile.columns if not own.channel],
         table=reading.table or profile.table or "",
         decimal=reading.decimal or profile.decimal or "",
         skip_rows=reading.skip_rows or profile.skip_rows,
         missing=reading.missing or profile.missing or "",
         good=reading.good or profile.good or "",
     )
-
-
-def _holds_no_dwell(columns: Mapping[str, FloatArray]) -> bool:
-    """Whether a record by its times is no test: nothing in it stays as it is for a while."""
-    try:
-        cut_plateaus(SampledChannels(columns))
-    except UnusableRecordError:
-        return True
-    return False

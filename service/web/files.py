@@ -86,12 +86,17 @@ def _end(file: IO[bytes], last: bytes) -> None:
     file.flush()
 
 
+def is_form(request: Request) -> bool:
+    """Whether a body is a form, which may hold a profile beside the file."""
+    return request.headers.get("content-type", "").startswith("multipart/form-data")
+
+
 async def received(request: Request, path: Path, filename: str) -> tuple[str, RigProfile | None]:
     """Write a body, or the file in a form, to disk as it arrives; returns its sender's name for it, and a form's `profile`.
 
     Raises InvalidError where the form has no file or its profile cannot be used.
     """
-    if not request.headers.get("content-type", "").startswith("multipart/form-data"):
+    if not is_form(request):
         async with opened(path, "wb") as file:
             await written(request.stream(), file)
         return filename, None

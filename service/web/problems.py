@@ -12,7 +12,9 @@ from fastapi.responses import Response
 from starlette.exceptions import HTTPException
 
 from service.answers.store import to_json
-from service.api.base import Problem, ProblemError, rule_in_words
+from service.api.base import rule_in_words
+from service.api.problem import Problem, ProblemError
+from service.api.rig import Suggestion
 from service.errors import (
     ConflictError,
     DamagedError,
@@ -43,7 +45,13 @@ _log = logging.getLogger("clutchlife")
 
 
 def problem(
-    status: int, slug: str, title: str, detail: str, errors: tuple[FieldError, ...] = (), total: int = 0
+    status: int,
+    slug: str,
+    title: str,
+    detail: str,
+    errors: tuple[FieldError, ...] = (),
+    total: int = 0,
+    suggestion: Suggestion | None = None,
 ) -> Response:
     body = Problem(
         type=f"urn:clutchlife:problem:{slug}",
@@ -53,6 +61,7 @@ def problem(
         errors=[_shown(error) for error in errors],
         total_errors=total,
         request_id=request_id.get(),
+        suggestion=suggestion,
     )
     headers = {"Cache-Control": "no-store"}
     if status in (http.HTTPStatus.SERVICE_UNAVAILABLE, http.HTTPStatus.TOO_MANY_REQUESTS):
@@ -92,7 +101,11 @@ def install(app: FastAPI) -> None:
 
 
 def _service_error(_: Request, error: ServiceError) -> Response:
-    return problem(error.status, error.slug, error.title, _printable(error.detail), error.errors, error.total)
+    held = error.suggestion if isinstance(error, InvalidError) else None
+    suggestion = held if isinstance(held, Suggestion) else None
+    return problem(
+        error.status, error.slug, error.title, _printable(error.detail), error.errors, error.total, suggestion
+    )
 
 
 def _storage_error(_: Request, error: StorageError) -> Response:

@@ -20,6 +20,7 @@ from models.tracking.filters.grid import Grid
 from models.tracking.filters.particle import Particle
 from models.tracking.filters.ukf import Ukf
 from models.tracking.prior import weak
+from tests.benchmarks.formats import formats
 from tests.benchmarks.pages import pages, start_page
 from tests.benchmarks.records import records
 from tests.measuring import show
@@ -136,5 +137,6 @@ if __name__ == "__main__":
     identification()
     tracking()
     records()
+    formats()
     pages()
     start_page()

@@ -11,7 +11,7 @@ from rich.progress import Progress
 from service.cli.options import EX_DATAERR, EX_TEMPFAIL, err, fail, out, say
 from service.cli.sending import spool as entries
 from service.cli.sending.spool import INSPECTIONS, RUNS, Entry, HeldError, Spool
-from service.client.clutchlife.answers import RefusedError, ServiceAwayError
+from service.client.clutchlife.answers import RefusedError, ServiceAwayError, suggested
 from service.client.clutchlife.transport import NoLongerWantedError, Service, connect
 
 
@@ -153,6 +153,11 @@ def _refused(spool: Spool, entry: Entry, error: RefusedError, report: Report) ->
     aside = spool.refuse(entry, error.problem)
     place = "a newer version has replaced it" if aside is None else str(aside)
     report(f"{entry.label} is refused, {error}; kept: {place}")
+    if error.suggestion is not None:
+        report(f"{entry.label}: {suggested(error.suggestion)}")
+        report(
+            f"{entry.label}: to confirm it, and keep it for the rig: clutchlife import FILE --clutch {spool.clutch_id}"
+        )
     if error.other_content:
         report(
             f"{entry.label}: the service has other content under this run_id: the stored run was corrected later, or "

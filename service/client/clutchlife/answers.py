@@ -60,6 +60,10 @@ class DiagnosisFailedError(ClutchlifeError):
     """A diagnosis ended without a report; `problem` holds why as `detail`."""
 
 
+#: What a suggestion says beside its columns.
+_SUGGESTED = ("table", "time", "decimal", "missing", "good", "kind", "cycles", "clutch_id")
+
+
 class RefusedError(ClutchlifeError):
     """The service refused the request; repeating it would be refused again. `problem["errors"]` says what is wrong where."""
 
@@ -79,6 +83,12 @@ class RefusedError(ClutchlifeError):
         return self.status in _ALL_RUNS or self.problem.get("type") == _ARCHIVED
 
     @property
+    def suggestion(self) -> dict[str, Any] | None:
+        """How a refused file may be read, for you to confirm (`Client.confirm_suggestion`); None: nothing is suggested."""
+        held = self.problem.get("suggestion")
+        return held if isinstance(held, dict) else None
+
+    @property
     def unknown(self) -> bool:
         """Whether the service itself says that there is nothing of that name."""
         return self.problem.get("type") == _UNKNOWN
@@ -87,6 +97,15 @@ class RefusedError(ClutchlifeError):
     def other_content(self) -> bool:
         """Whether the service holds other content under the run's name."""
         return self.problem.get("type") == _CONFLICT
+
+
+def suggested(suggestion: dict[str, Any]) -> str:
+    """A suggestion in a line: its columns, clock, run and first row."""
+    parts = [f"{channel} from {title}" for channel, title in suggestion["map"].items()]
+    stated = {name: suggestion[name] for name in _SUGGESTED if suggestion.get(name) not in (None, "")}
+    parts += [f"{name} {value:g}" if isinstance(value, float) else f"{name} {value}" for name, value in stated.items()]
+    first = ", ".join(f"{name} {value:.6g}" for name, value in (suggestion["rows"] or [{}])[0].items())
+    return f"suggested ({suggestion['confidence']:.0%}): {', '.join(parts)}; first row: {first}"
 
 
 def passing(response: httpx2.Response, answer: object | None) -> str | None:

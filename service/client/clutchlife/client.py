@@ -104,6 +104,19 @@ class Client:
             return self.service.post_file(f"{address}/file", path, parameters)
         return self.service.post(address, _content({**({} if run is None else run), **fields}))
 
+    def confirm_suggestion(
+        self, clutch_id: str, run: str | Path, refused: RefusedError, rig: str | None = None, **fields: Any
+    ) -> Answer:
+        """Send a file again as its refusal suggests; its receipt. `rig`: a new name, under which the reading is kept for the
+        next files. `fields`, such as `cycles`, come before what is suggested.
+
+        Raises ValueError where nothing was suggested.
+        """
+        if refused.suggestion is None:
+            raise ValueError("the refusal has no suggestion to confirm")
+        said = {name: refused.suggestion[name] for name in ("profile", "time", "kind", "cycles")}
+        return self.post_run(clutch_id, run, **{**said, "rig": rig, **fields})
+
     def confirm(self, clutch_id: str, *run_ids: str, reason: str = "") -> Answer:
         """Accept held runs as they were sent, all of them in one step; their receipts are in `items`."""
         return self.service.post(f"{_clutch(clutch_id)}/runs/confirm", {"run_ids": run_ids, "reason": reason})

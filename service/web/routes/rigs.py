@@ -3,8 +3,9 @@
 import asyncio
 from functools import partial
 from pathlib import Path
+from typing import Annotated
 
-from fastapi import APIRouter, Request
+from fastapi import APIRouter, Query, Request
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import Response
 
@@ -91,10 +92,12 @@ async def preview_file(
     decimal: parameters.FileDecimal = "",
     missing: parameters.FileMissing = "",
     good: parameters.FileGood = "",
+    time: parameters.FileTime = "",
+    together: Annotated[parameters.FilesTogether, Query()] = [],  # noqa: B006 (FastAPI copies it)
 ) -> Response:
     """A preview of a file: its first rows, the channel and unit of each column, what would be cut and fitted. Nothing
     is stored. Without `rig` or a `profile` in the form, the saved profile that has the file's columns is used, else
-    the titles of the columns.
+    the titles of the columns, else a suggestion.
     """
     if clutch_id is not None:
         require_clutch(grant_of(request), clutch_id)
@@ -109,7 +112,8 @@ async def preview_file(
             kind=kind,
             cycles=cycles,
             clutch_id=clutch_id,
-            reading=reading_of(map, decimal=decimal, missing=missing, good=good),
+            reading=reading_of(map, decimal=decimal, missing=missing, good=good, time=time),
+            beside=together,
         )
         shown = await asyncio.wrap_future(context.workers.submit(Lane.FILES, computing, path))
     return json_answer(shown)

@@ -32,10 +32,12 @@ from service.api.run import (
 )
 from service.changes import change_run
 from service.changes.ingest_run import ingest_posted
+from service.changes.save_rig import save_confirmed
 from service.errors import NoRoomError, NotAcceptableError, NotFoundError
 from service.jobs.workers import Lane
 from service.readers.read_file import reading_of
 from service.runs.json_run import read_run, read_run_on_disk
+from service.runs.suggestion import confirmed_profile
 from service.runs.upload import read_file_run
 from service.web import files, responses
 from service.web.auth import Ingester, Reader, grant_of
@@ -79,31 +81,44 @@ async def post_run_file(
     origin: Origin = "measured",
 ) -> Response:
     """Post a run as CSV, XLSX, ODS, TDMS, MDF4, MATLAB, HDF5 or Parquet, plain, gzipped or in a ZIP archive. The file
-    is kept as sent. A form may also hold a `profile` to read this file with.
+    is kept as sent. A form may also hold a `profile` to read this file with. A file that is not read without a question is
+    refused with a `suggestion`: to confirm it, send the file again with its arguments or its `profile`. If `rig` is a new
+    name then, what was confirmed is saved as that rig's profile.
     """
-    profile = None if rig is None else await run_in_threadpool(rigs.rig_profile, context.database, rig)
+    form = files.is_form(request)
+    known = rig is None or await run_in_threadpool(rigs.is_saved, context.database, rig)
+    # raises where the rig is not known and nothing is confirmed
+    saved = rig is not None and (known or not (form or map))
+    profile = await run_in_threadpool(rigs.rig_profile, context.database, rig) if rig and saved else None
     async with files.temporary_folder(context.folder) as folder:
         path = Path(folder) / "run"
         filename, content = await files.received(request, path, filename)
+        reading = reading_of(
+            map, table=table, time=time, decimal=decimal, skip_rows=skip_rows, missing=missing, good=good
+        )
         read = partial(
             read_file_run,
             path,
             filename=filename,
             kind=kind,
             cycles=cycles,
-            reading=reading_of(
-                map, table=table, time=time, decimal=decimal, skip_rows=skip_rows, missing=missing, good=good
-            ),
+            reading=reading,
             profile=content or profile,
-            rig=None if content else rig,
+            rig=None if content and saved else rig,
             run_id=run_id,
             started_at=started_at,
             origin=origin,
         )
         by = grant_of(request).name
         # without a turn: a file that takes long to read would have the clutch's other runs wait
-        taken_in = context.workers.submit(Lane.FILES, ingest_posted, clutch_id, read, responses.now(), by, path)
+        at = responses.now()
+        taken_in = context.workers.submit(Lane.FILES, ingest_posted, clutch_id, read, at, by, path)
         receipt, new = await asyncio.wrap_future(taken_in)
+        if rig is not None and not saved:  # a run that is refused leaves no profile
+            confirmed = partial(
+                confirmed_profile, path, rig, content, filename=filename, kind=kind, cycles=cycles, reading=reading
+            )
+            await asyncio.wrap_future(context.workers.submit(Lane.FILES, save_confirmed, confirmed, by, at))
     return responses.json_answer(
         receipt, 201 if new else 200, Location=f"/v1/clutches/{clutch_id}/runs/{receipt.run_id}"
     )

@@ -44,16 +44,17 @@ def test_the_second_file_of_a_rig_is_taken_without_a_question(
     page = opened(watched)
     drop(page, {f"Stat_{first}_a.{ending}": content(first)})
     dialog = page.get_by_role("dialog", name="Send a run")
-    expect(dialog.get_by_text("Still missing")).to_be_visible()  # no title says which column is the torque
-    dialog.get_by_label(f"Channel of {torque}").select_option("torque_nm")
+    expect(dialog.get_by_text("Its reading is suggested")).to_be_visible()  # no title says which column is the torque
+    expect(dialog.get_by_label(f"Channel of {torque}")).to_have_value("torque_nm")
     expect(dialog.get_by_label(f"Unit of {torque}")).to_have_value("kNm")
-    dialog.get_by_label("Kind of test").select_option("stationary_stribeck")
+    expect(dialog.get_by_label("Kind of test")).to_have_value("stationary_stribeck")
+    dialog.get_by_role("button", name="Send", exact=True).click()  # the browser asks for the confirmation
     expect(dialog.get_by_text("3 curves are fitted")).to_be_visible()
     expect(dialog.get_by_label("File names")).to_have_value(f"Stat_{{cycles}}_a.{ending}")
     assert server.http.get("/v1/clutches/bench3-017/runs").json()["items"] == [] or ending == "xlsx"
     dialog.get_by_label("Name of the rig").fill(rig)
     dialog.get_by_label("File names").fill(f"Stat_{{cycles}}_*.{ending}")
-    dialog.get_by_role("button", name="Save as rig profile").click()
+    dialog.get_by_role("button", name="Confirm and save as rig profile").click()
     expect(dialog.get_by_text(f"Read by the rig profile {rig}.")).to_be_visible()
     dialog.get_by_role("button", name="Send", exact=True).click()
     expect(dialog.get_by_text("Stored", exact=True)).to_be_visible()
@@ -66,6 +67,26 @@ def test_the_second_file_of_a_rig_is_taken_without_a_question(
     channels = server.http.get(f"/v1/clutches/bench3-017/runs/{receipt['run_id']}").json()["channels"]
     sent = stationary(second, pressures=(4.0, 5.0, 6.0), speeds=SPEEDS_RPM[::4])
     assert channels["torque_nm"] == pytest.approx(sent["channels"]["torque_nm"])
+
+
+def test_one_confirmation_is_for_all_files_that_were_dropped_together(watched: Watched, server: Server) -> None:
+    page = watched.open("/")
+    page.get_by_text("Live, as of").wait_for()
+    server.http.post("/v1/clutches", json={"clutch_id": "KL-4712"}).raise_for_status()
+    counts = (0, 1500, 3000, 4500)
+    drop(page, {f"KL-4712_{cycles:05d}.csv": german(cycles, torque="My") for cycles in counts})
+    dialog = page.get_by_role("dialog", name="Send 4 runs")
+    expect(dialog.get_by_label("Clutch", exact=True)).to_have_value("KL-4712")
+    expect(dialog.get_by_text("suggested by the files’ names and title blocks")).to_have_count(5)
+    for field, cycles in zip(dialog.get_by_label("Duty cycles since new").all(), counts, strict=True):
+        expect(field).to_have_value(str(cycles))
+    dialog.get_by_label("The channels, units and rows").first.check()
+    for place in range(len(counts)):
+        expect(dialog.get_by_text("Ready to send.").nth(place)).to_be_visible()
+    dialog.get_by_role("button", name="Send 4 runs").click()
+    dialog.get_by_text("All 4 stored.").wait_for()
+    runs = server.http.get("/v1/clutches/KL-4712/runs").json()["items"]
+    assert [run["cycles"] for run in runs] == [*counts]
 
 
 def opened(watched: Watched) -> Page:

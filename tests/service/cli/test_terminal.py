@@ -20,12 +20,12 @@ from service.cli import answers, options
 from service.cli.clutches import _row
 from service.cli.export import TABLES
 from service.cli.options import EX_DATAERR, fail, out, print_line
-from service.cli.sending import push
+from service.cli.sending import delivery, push
 from service.cli.workbook import write_workbook
 from service.client.clutchlife import Client
 from tests.service.clients import clutchlife, post_run
 from tests.service.web.routes.surfaces import png, sha256
-from tests.service.web.test_import_preview import german
+from tests.service.web.test_import_preview import foreign, german
 from tests.support import free_port, post_tests, stationary
 
 Terminal = Callable[..., str]
@@ -148,9 +148,9 @@ def test_only_a_first_file_is_asked_about(terminal: Terminal, client: TestClient
     first, second = tmp_path / "Stat_7000.csv", tmp_path / "Stat_8000.csv"
     first.write_bytes(german(7000))
     second.write_bytes(german(8000))
-    # the torque is the first column that is left out, the kind the first of those that fit, the cycles, send, the name
-    shown = terminal("import", first, "--clutch", "c1", answers="1\n1\n7000\ny\nbench-3\n")
-    assert "Column of torque_nm" in shown
+    # the cycles are suggested by the file's name; then the columns are confirmed, and the name of the rig
+    shown = terminal("import", first, "--clutch", "c1", answers="\ny\nbench-3\n")
+    assert "These columns are suggested, not certain (75%). Are they right?" in shown
     assert "saved as rig profile bench-3; file names such as Stat_{cycles}.csv give the cycles" in shown
     assert "3 curves" in shown
     again = terminal("import", second, "--clutch", "c1", "--yes")
@@ -160,6 +160,19 @@ def test_only_a_first_file_is_asked_about(terminal: Terminal, client: TestClient
         (7000, "Stat_7000.csv", "bench-3"),
         (8000, "Stat_8000.csv", "bench-3"),
     ]
+
+
+def test_a_push_of_unknown_titles_shows_what_is_suggested(
+    terminal: Terminal, client: TestClient, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(delivery, "connect", lambda *_, **__: nullcontext(client))
+    file = tmp_path / "KL-4712_01500.csv"
+    file.write_bytes(foreign())
+    given = ("--clutch", "c1", "--kind", "stationary_stribeck", "--cycles", "1500", "--spool", tmp_path / "spool")
+    shown = terminal("push", file, *given, code=EX_DATAERR)
+    assert "suggested (80%): torque_nm from Couple FZG" in shown
+    assert "first row: pressure_bar 5, speed_rpm 20, torque_nm 20.48" in shown
+    assert client.get("/v1/clutches/c1/runs").json()["items"] == []
 
 
 def test_a_pushed_file_is_the_same_run_when_imported(terminal: Terminal, client: TestClient, tmp_path: Path) -> None:
@@ -175,10 +188,10 @@ def test_a_pushed_file_is_the_same_run_when_imported(terminal: Terminal, client:
 def test_what_is_not_sent_or_not_known_leaves_nothing(terminal: Terminal, client: TestClient, tmp_path: Path) -> None:
     file = tmp_path / "Stat_7000.csv"
     file.write_bytes(german(7000))
-    shown = terminal("import", file, "--clutch", "c1", "--save", "bench-3", answers="1\n1\n7000\nn\n")
+    shown = terminal("import", file, "--clutch", "c1", "--save", "bench-3", answers="7000\nn\n")
     assert "rig profile" not in shown
     shown = terminal("import", file, "--clutch", "c1", "--yes", "--cycles", "7000", code=EX_DATAERR)
-    assert "still missing: torque_nm, kind" in shown
+    assert "no column is known as torque_nm; suggested (75%): torque_nm from Mz," in shown
     assert client.get("/v1/rigs").json()["items"] == client.get("/v1/clutches/c1/runs").json()["items"] == []
 
 
@@ -202,7 +215,7 @@ def test_options_say_what_no_title_does_and_are_kept(terminal: Terminal, client:
 
 def test_a_run_read_by_a_wrong_factor_is_read_again(terminal: Terminal, client: TestClient, tmp_path: Path) -> None:
     (tmp_path / "Stat_7000.csv").write_bytes(german(7000))
-    terminal("import", tmp_path / "Stat_7000.csv", "--clutch", "c1", answers="1\n1\n7000\ny\nbench-3\n")
+    terminal("import", tmp_path / "Stat_7000.csv", "--clutch", "c1", answers="\ny\nbench-3\n")
     run = client.get("/v1/clutches/c1/runs").json()["items"][0]["run_id"]
     saved = ("version", "saved_at", "saved_by")
     profile = {name: value for name, value in client.get("/v1/rigs/bench-3").json().items() if name not in saved}

@@ -19,6 +19,8 @@ from service.channels import check_columns
 from service.errors import InvalidError, ServiceError, TooLargeError
 from service.readers.limits import LIMITS
 from service.readers.read_file import read_file
+from service.readers.table import Reading
+from service.runs.suggestion import suggestion_of
 from tests.service.readers.sample_files import UNITS, read_content, record, write_mdf, write_parquet, write_tdms
 
 #: Little files are read soon, by the time of a processor; what is wrong with a changed one shows as well in few rows. On a
@@ -111,6 +113,10 @@ def is_of_the_reader(refusal: ServiceError) -> bool:
 NUMBERS = dict.fromkeys(NAMES, 200) | {"run.csv": 10_000, "run.zip": 5_000, "run.mf4": 120}
 
 
+#: Of so many refused files one is asked for a suggestion, which reads it several times.
+_SUGGESTED = 5
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_a_changed_file_is_read_or_refused(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -128,6 +134,8 @@ def test_a_changed_file_is_read_or_refused(name: str, tmp_path: Path, monkeypatc
         tried += 1
         if refusal := refusal_of(path, name):
             refused += 1
+            if tried % _SUGGESTED == 0:  # what is refused is looked at once more, for a suggestion
+                suggestion_of(path, filename=name, reading=Reading())
             if is_of_the_reader(refusal):
                 faults.append(f"seed {seed}: {refusal.detail}")
     assert faults == []

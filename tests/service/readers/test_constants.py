@@ -9,6 +9,8 @@ from fastapi.testclient import TestClient
 
 from service.errors import InvalidError
 from service.readers.read_file import preview_file, read_file, reading_of
+from service.readers.table import Reading
+from service.runs.suggestion import suggestion_of
 from tests.service.readers.sample_files import read_content
 
 SPEEDS = [20.0, 120.0, 520.0, 1970.0]
@@ -65,8 +67,10 @@ def test_values_in_the_titles_of_columns_make_a_part_each(tmp_path: Path, form: 
     if own_speeds:
         titles, columns = titles[1:], columns[1:]
     content = ";".join(titles) + "\n" + "".join(";".join(map(str, row)) + "\n" for row in zip(*columns, strict=True))
-    with pytest.raises(InvalidError, match="must be one column"):
-        read_content(tmp_path, content)
+    (tmp_path / "asked").write_text(content, encoding="utf-8")
+    suggestion = suggestion_of(tmp_path / "asked", filename="a.csv", reading=Reading())
+    assert suggestion is not None
+    assert suggestion.map["pressure_bar"] == "=columns"
     read = read_content(tmp_path, content, "pressure_bar:=columns")
     assert {name: column.tolist() for name, column in read.columns.items()} == {
         name: values.tolist() for name, values in STACKED.items()

@@ -3,6 +3,7 @@
 All hold the same record or the same plateaus; what differs is how it is written.
 """
 
+import contextlib
 import io
 import json
 import re
@@ -33,6 +34,7 @@ from service.readers.limits import LIMITS
 from service.readers.read_file import preview_file, read_file
 from service.readers.table import Reading
 from service.readers.unit_table import UNITS
+from service.runs.suggestion import suggestion_of
 from tests.service.readers.sample_files import read_content
 
 ROWS = 12
@@ -286,9 +288,30 @@ MAPS = {
 }
 
 
-@pytest.mark.parametrize("name", TEXTS)
+#: Those whose titles are of another language, or known in part: they are suggested.
+SUGGESTED = {
+    "gbk.csv", "french.csv", "spanish.csv", "japanese.csv", "japanese-euc.csv", "japanese-wide.csv", "chinese-slash.csv",
+    "chinese-units.csv", "taiwanese.csv", "an-oil-pressure.asc", "time-by-another-name.csv", "titles-of-two-words.txt",
+    "spanish-months.csv", "places-in-titles.csv", "set-points.csv",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", sorted(TEXTS.keys() - SUGGESTED))
 def test_a_text_gives_its_numbers(tmp_path: Path, name: str) -> None:
     assert_record(read_content(tmp_path, TEXTS[name], MAPS.get(name), name=name))
+
+
+@pytest.mark.parametrize("name", sorted(SUGGESTED))
+def test_a_text_is_not_read_in_silence_and_what_is_suggested_gives_its_numbers(tmp_path: Path, name: str) -> None:
+    with contextlib.suppress(InvalidError):
+        assert read_content(tmp_path, TEXTS[name], name=name).columns.keys() != RECORD.keys()
+    suggestion = suggestion_of(tmp_path / "posted", filename=name, reading=Reading())
+    assert suggestion is not None
+    assert suggestion.confidence >= 0.6
+    mapping = ",".join(f"{channel}:{title}" for channel, title in suggestion.map.items())
+    assert_record(read_content(tmp_path, TEXTS[name], mapping, name=name, time=suggestion.time))
+    first = suggestion.rows[0]
+    assert [first[channel] for channel in RECORD] == pytest.approx([column[0] for column in RECORD.values()])
 
 
 def assert_record(read: Channels) -> None:
@@ -350,12 +373,8 @@ REFUSED: list[tuple[Any, ...]] = [
     ("t [s];Torque A1 [Nm];Torque A2 [Nm]\n0;1;2\n", "torque_nm must be one column"),
     ("t [s];M [Nm]\n0;21\n", "must not name one column for torque_nm and pressure_bar", "torque_nm:M,pressure_bar:M"),
     (
-        "t [s];p [bar];n inner [rpm];n outer [rpm];M [Nm]\n0;5;520;500;20\n",
+        "t [s];p [bar];n 1 [rpm];n 2 [rpm];M [Nm]\n0;5;520;500;20\n",
         "if the columns hold the speeds of both sides, send the difference",
-    ),
-    (
-        "t [s];p [bar];n [rpm];Torque FZG [Nm];Torque HBM [Nm]\n0;5;100;1;2\n",
-        "torque_nm must be one column, got Torque FZG and Torque HBM; choose one with map=torque_nm:NAME",
     ),
     (
         "Time,p [bar],n [rpm],M [Nm]\n" + "".join(f"08:00:0{k // 10},5,{k},20\n" for k in range(40)),
@@ -477,10 +496,11 @@ GIVEN: dict[str, tuple[str, dict[str, Any], dict[str, Any], list[str]]] = {
         "\n".join(f"{title};{';'.join(map(str, column))}" for title, column in zip(
             ("Druck;bar", "Drehzahl;1/min", "Drehmoment;Nm"), FIVE.values(), strict=True)), {}, FIVE, ["turned"],
     ),
-    "a title over merged cells": (  # only of the oil is a temperature known
+    "a title over merged cells": (  # only of the oil is a temperature known, and a pressure of the oil is suggested
         "Messwerte,,,Öl,\n" + ",".join(NAMES[name] for name in MERGED) + ",Temperatur [°C]\n"
         + "".join(f"{line},{60 + k}\n" for k, line in enumerate(rows(names=MERGED).splitlines())),
-        {}, RECORD | {"oil_temperature_c": range(60, 60 + ROWS)}, ["name_in_part"],
+        {}, {name: values for name, values in RECORD.items() if name != "pressure_bar"}
+        | {"oil_temperature_c": range(60, 60 + ROWS)}, ["columns_left_out"],
     ),
     "a unit in the map": (TWO_UNITS, {"mapping": "torque_nm:Mz [kNm]"}, {"torque_nm": [1000, 2000]}, ["columns_left_out"]),
     "a multiple in the map": (UNKNOWN_UNIT, {"mapping": "torque_nm:M [x10 Nm]"}, {"torque_nm": [10, 20]}, []),

@@ -2,6 +2,7 @@
 
 import os
 import platform
+import signal
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -9,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from service.errors import BusyError, InvalidError, TooLargeError
-from service.readers import confinement, sandbox
+from service.readers import confinement, sandbox, zygote
 from service.readers.detect import Format
 from service.readers.limits import LIMITS, Limits
 from service.readers.read_file import read_file
@@ -144,3 +145,20 @@ def test_a_reader_may_do_what_reading_needs(tmp_path: Path, monkeypatch: pytest.
 def test_a_reader_opens_only_so_many_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(InvalidError, match="Too many open files"):
         read_with(tmp_path, monkeypatch, "held = [open(path) for _ in range(1000)]; raise ValueError(len(held))")
+
+
+def test_readers_stay_warm_and_one_that_ended_is_replaced(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first file has the library loaded; the next is read by a child of the same process, and of another where that
+    ended."""
+    monkeypatch.setenv("LANG", "C.UTF-8")  # a zygote of its own
+    path = write_tdms(tmp_path / "a.tdms", record(50), units=UNITS)
+
+    def read_by() -> int:
+        assert read_file(path, filename="a.tdms").columns["torque_nm"].size == 50
+        return zygote._idle[-1][1]._process.pid
+
+    first = read_by()
+    assert read_by() == first
+    os.kill(first, signal.SIGKILL)
+    zygote._idle[-1][1]._process.wait()
+    assert read_by() != first

@@ -44,7 +44,8 @@ def test_a_first_file_becomes_a_profile_and_the_second_needs_no_answer(client: T
     first = preview(client, german(7000))
     assert first["above"][:3] == [["Prüfstand", "3"], ["Prüfer", "Müller"], ["Lastspiele", "7000"]]
     assert first["first_rows"][0][0].startswith("4")
-    assert (first["rig"], first["missing"], first["problem"]) == (None, ["torque_nm", "kind", "cycles"], None)
+    assert (first["rig"], first["missing"], first["problem"]) == (None, ["cycles"], None)
+    assert first["suggestion"]["map"]["torque_nm"] == "Mz"
     profile = chosen(first, "Mz", channel="torque_nm")
     second = preview(client, german(7000), profile, kind="stationary_stribeck", cycles=7000)
     assert (second["missing"], second["problem"]) == ([], None)
@@ -67,18 +68,97 @@ def test_a_first_file_becomes_a_profile_and_the_second_needs_no_answer(client: T
     assert receipt["fits"][0]["parameters"] == third["fits"][0]["parameters"]
 
 
-def test_a_title_that_is_understood_in_part_is_marked_as_in_a_push(client: TestClient) -> None:
-    file = b"p [bar];n [rpm];Torque FZG [Nm]\n" + b"".join(b"5;%d;20,5\n" % n for n in (20, 120, 520, 1020, 1970))
-    shown = preview(client, file, kind="stationary_stribeck", cycles=0)
-    address = "/v1/clutches/c1/runs/file?kind=stationary_stribeck&cycles=0"
-    pushed = client.post(address, content=file).json()["warnings"]
-    codes = [[warning["code"] for warning in warnings] for warnings in (shown["warnings"], pushed)]
-    assert (shown["problem"], shown["missing"], codes[0]) == (None, [], codes[1])
-    assert "name_in_part" in codes[0]
-    assert [column["in_part"] for column in shown["columns"]] == [False, False, True]
-    left_open = preview(client, b"p [bar];n a [rpm];n b [rpm];Torque FZG [Nm]\n5;20;21;20,5\n5;40;41;20,7\n")
-    assert left_open["missing"][0] == "speed_rpm"
-    assert [column["in_part"] for column in left_open["columns"]] == [False, False, False, True]
+FOREIGN = "Pression [bar];Vitesse [tr/min];Couple FZG [N.m];T_amb [°C]\n"
+
+
+def foreign(torque: float = 20.5) -> bytes:
+    return FOREIGN.encode() + b"".join(b"5;%d;%g;21\n" % (n, torque - n / 1000) for n in (20, 120, 520, 1020, 1970))
+
+
+def as_arguments(suggestion: dict[str, Any]) -> dict[str, Any]:
+    """A suggestion as the arguments that confirm it."""
+    mapping = ",".join(f"{channel}:{title}" for channel, title in suggestion["map"].items())
+    return {"map": mapping} | {
+        name: suggestion[name] for name in ("table", "time", "decimal", "missing", "good", "kind")
+    }
+
+
+def test_a_file_of_unknown_titles_is_refused_with_a_complete_reading_and_nothing_is_stored(client: TestClient) -> None:
+    refused = client.post("/v1/clutches/c1/runs/file", params={"filename": "KL-4712_01500.csv"}, content=foreign())
+    problem = refused.json()
+    assert (refused.status_code, "A reading is suggested" in problem["detail"]) == (422, True)
+    suggestion = problem["suggestion"]
+    assert suggestion["map"] == {"torque_nm": "Couple FZG", "speed_rpm": "Vitesse", "pressure_bar": "Pression"}
+    assert (suggestion["kind"], suggestion["cycles"], suggestion["clutch_id"]) == (
+        "stationary_stribeck",
+        1500,
+        "KL-4712",
+    )
+    assert suggestion["rows"][0] == {"pressure_bar": 5, "speed_rpm": 20, "torque_nm": pytest.approx(20.48)}
+    assert len(suggestion["rows"]) == 2
+    assert 0.6 < suggestion["confidence"] < 1
+    assert client.get("/v1/clutches/c1/runs").json()["items"] == []
+    assert client.get("/v1/rigs").json()["items"] == []
+
+
+@pytest.mark.parametrize("way", ["arguments", "profile"])
+def test_one_confirmation_keeps_the_reading_as_the_rig_s_profile_which_reads_the_next_file(
+    client: TestClient, way: str
+) -> None:
+    address, name = "/v1/clutches/c1/runs/file", "KL-4712_01500.csv"
+    suggestion = client.post(address, params={"filename": name}, content=foreign()).json()["suggestion"]
+    asked = {"filename": name, "cycles": suggestion["cycles"], "rig": "bench-7"}
+    assert (
+        client.post(address, params=asked, content=foreign()).status_code == 404
+    )  # nothing is confirmed by a name alone
+    if way == "arguments":
+        first = client.post(address, params=asked | as_arguments(suggestion), content=foreign())
+    else:
+        form = {"profile": json.dumps(suggestion["profile"])}
+        first = client.post(address, params=asked, data=form, files={"file": (name, foreign())})
+    assert first.status_code == 201, first.text
+    receipt = first.json()
+    assert (receipt["cycles"], receipt["file"]["rig"]) == (1500, "bench-7")
+    (saved,) = client.get("/v1/rigs").json()["items"]
+    assert (saved["name"], saved["file_name"], saved["kind"]) == (
+        "bench-7",
+        "{clutch_id}_{cycles}.csv",
+        "stationary_stribeck",
+    )
+    assert [column["channel"] for column in saved["columns"] if column["title"] == "T_amb"] == [None]
+    following = {"filename": "KL-4712_03000.csv", "rig": "bench-7"}
+    second = client.post(address, params=following, content=foreign(19.5))
+    assert (second.status_code, second.json()["cycles"]) == (201, 3000)
+    assert "columns_left_out" not in {warning["code"] for warning in second.json()["warnings"]}  # left out on purpose
+    shown = preview(client, foreign(18.5), filename="KL-4712_04500.csv")
+    assert (shown["rig"], shown["suggestion"], shown["clutch_id"]) == ("bench-7", None, "KL-4712")
+
+
+def test_a_refused_run_leaves_no_profile(client: TestClient) -> None:
+    mapping = {
+        "map": "torque_nm:Couple FZG,speed_rpm:Vitesse",
+        "rig": "half",
+        "cycles": 0,
+        "kind": "stationary_stribeck",
+    }
+    assert client.post("/v1/clutches/c1/runs/file", params=mapping, content=foreign()).status_code == 422
+    assert client.get("/v1/rigs").json()["items"] == []
+
+
+def test_a_preview_shows_the_suggestion_and_what_all_names_say(client: TestClient) -> None:
+    names = [f"bench_{number}_7{number:02d}_{cycles}.csv" for number, cycles in enumerate((0, 1500, 3000, 4500), 4)]
+    shown = preview(client, foreign(), filename=names[1], together=[name for name in names if name != names[1]])
+    assert shown["suggested_run"]["cycles"] == 1500  # the other numbers that change count files
+    names = [f"KL_x_{cycles:05d}.csv" for cycles in (0, 1500, 3000, 4500)]
+    shown = preview(client, foreign(), filename=names[1], together=names)
+    assert shown["suggested_run"] == {"kind": None, "cycles": 1500, "clutch_id": None}
+    assert [column["channel"] for column in shown["columns"]] == ["pressure_bar", "speed_rpm", "torque_nm", None]
+    assert (shown["problem"], shown["missing"]) == (None, ["cycles"])
+    assert shown["suggestion"]["cycles"] == 1500
+    head = b"Kupplung;KL-4712\nSchaltungen;5000\n\n"
+    shown = preview(client, head + foreign(), filename="x.csv")
+    assert shown["suggested_run"] == {"kind": None, "cycles": 5000, "clutch_id": "KL-4712"}
+    assert (shown["profile"]["cycles_cell"], shown["profile"]["clutch_cell"]) == ("Schaltungen", "Kupplung")
 
 
 def test_cycles_stand_in_a_cell_above_the_table(client: TestClient) -> None:
@@ -94,6 +174,7 @@ def test_cycles_stand_in_a_cell_above_the_table(client: TestClient) -> None:
 def test_a_unit_is_chosen_never_taken_for_granted_and_not_overruled_in_silence(client: TestClient) -> None:
     bare = german(0, torque="M", unit="")
     profile = chosen(preview(client, bare), "M", channel="torque_nm")
+    profile = chosen({"profile": profile}, "M", unit=None)
     open_ = preview(client, bare, profile, kind="stationary_stribeck", cycles=0)
     assert open_["missing"] == ["unit of M"]
     given = chosen(open_, "M", unit="kNm")

@@ -17,19 +17,26 @@ export async function batchOf(files) {
   const record = await object(files.find((file) => file.name === RECORD));
   /** @type {Batch} */
   const batch = { runs: [], record: record && !("kind" in record) ? record : null, wrong: [] };
+  const together = {
+    names: files.map((file) => file.name),
+    readings: () => batch.runs.flatMap(({ reading }) => reading ?? []),
+  };
   for (const file of files) {
     if (file.name === LIST && listed !== null) continue;
     if (file.name === RECORD && batch.record !== null) continue;
-    if (!/\.json$/i.test(file.name)) batch.runs.push(runFile(file, null, listed?.get(file.name)));
+    if (!/\.json$/i.test(file.name)) batch.runs.push(runFile(file, null, together, listed?.get(file.name)));
     else {
       const run = await jsonRun(file);
       if (typeof run === "string") batch.wrong.push(`${file.name}: ${run}`);
-      else batch.runs.push(runFile(file, run));
+      else batch.runs.push(runFile(file, run, together));
     }
   }
-  batch.runs.sort((a, b) => a.order() - b.order());
+  batch.runs.sort(byOrder);
   return batch;
 }
+
+/** @type {(a: RunFile, b: RunFile) => number} by cycles, else by the numbers in their names */
+export const byOrder = (a, b) => a.order() - b.order() || a.name.localeCompare(b.name, undefined, { numeric: true });
 
 /** @type {(file: File) => Promise<JsonRun | string>} a JSON run without its channels, or why it is none */
 async function jsonRun(file) {

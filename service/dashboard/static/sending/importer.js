@@ -10,18 +10,24 @@ import { problemView } from "../shared/problem_view.js";
 import { warnings } from "./receipt.js";
 
 /** @import { Content } from "../shared/dom.js" */
+/** @typedef {{ names: string[], readings: () => Importer[] }} Together the files that were dropped together */
+/** @typedef {ReturnType<typeof importer>} Importer */
 
 /** Rows that are shown. */
 const ROWS = 5;
 /** Who chooses by typing a list's words is not interrupted by the answer to their first letter. */
 const PAUSE_MS = 400;
+/** Names of other files that are told, so that an address keeps its length. */
+const MOST_NAMES = 40;
 
 /**
  * @param {File} file
  * @param {number} number tells its fields from those of other files
- * @param {{ kind: HTMLSelectElement, cycles: HTMLInputElement, clutch: () => string }} run
+ * @param {{ kind: HTMLSelectElement, cycles: HTMLInputElement, clutch: () => string,
+ *   suggested: (run: SuggestedRun) => void }} run
+ * @param {Together} together
  */
-export function importer(file, number, run) {
+export function importer(file, number, run, together) {
   /** @type {Preview | null} */
   let preview = null;
   /** @type {RigProfile | null} the choices, where they are not those of a saved profile */
@@ -32,6 +38,8 @@ export function importer(file, number, run) {
   // what was typed stays when the rest is drawn again
   const rigName = h("input", { id: `rig-${number}`, spellcheck: "false" });
   const pattern = h("input", { id: `pattern-${number}` });
+  /** The time column of a suggestion, where no column of the profile says it. */
+  let time = "";
   const lead = h("p.quiet", { role: "status" }, "Reading …");
   const content = h("div");
   const element = h("details.import", h("summary", "Columns, units, and what is fitted"), content);
@@ -51,11 +59,14 @@ export function importer(file, number, run) {
     const { kind, cycles, clutch } = run;
     const query = new URLSearchParams({ filename: file.name.slice(-200) });
     const own = first ? {} : { kind: kind.value, cycles: cycles.value };
-    const more = { ...own, clutch_id: clutch(), rig: rig() };
+    const more = { ...own, clutch_id: clutch(), rig: rig(), time: chosen && time };
     for (const [name, value] of Object.entries(more)) if (value) query.set(name, value);
+    const others = together.names.filter((name) => name !== file.name).slice(0, MOST_NAMES);
+    for (const name of others) query.append("together", name.slice(-200));
     try {
       const { body } = await send("POST", `/v1/import/preview?${query}`, sent());
       if (question !== questions) return;
+      if (first) run.suggested(body.suggested_run);
       show(body);
       if (first && body.rig === null && (kind.value || cycles.value)) await look();
     } catch (problem) {
@@ -82,14 +93,46 @@ export function importer(file, number, run) {
     if (shown.cycles !== null && rig() !== null) run.cycles.value = String(shown.cycles);
     const focused = document.activeElement?.id;
     const left = shown.missing.map(quantity).join(", ");
-    const state = shown.problem ?? (left ? `Still missing: ${left}.` : "Ready to send.");
+    const ready = shown.suggestion === null ? "Ready to send." : "Its reading is suggested: check it, then confirm.";
+    const state = shown.problem ?? (left ? `Still missing: ${left}.` : ready);
     lead.replaceChildren(rig() === null ? "" : h("b", `Read by the rig profile ${rig()}. `), state);
-    element.open ||= shown.problem !== null || channelsLack();
-    content.replaceChildren(columnsTable(shown), options(shown), drawing(shown) ?? "");
+    element.open ||= shown.problem !== null || channelsLack() || (shown.suggestion !== null && isFirst(shown));
+    content.replaceChildren(confirming(shown) ?? "", columnsTable(shown), options(shown), drawing(shown) ?? "");
     const noted = warnings(shown.warnings);
     if (noted) content.append(noted);
-    content.append(saving(shown));
+    if (shown.suggestion === null) content.append(saving(shown));
     if (focused) document.getElementById(focused)?.focus(); // what was chosen in was drawn again
+  }
+
+  /** @type {(shown: Preview) => boolean} whether no file before it has the same columns */
+  function isFirst({ columns }) {
+    const like = together.readings().find((reading) => reading.titles() === titlesOf(columns));
+    return like === undefined || like.element === element;
+  }
+
+  /** @param {Preview} shown what asks for a confirmation, null where nothing is suggested */
+  function confirming(shown) {
+    const { suggestion, columns } = shown;
+    if (suggestion === null) return null;
+    if (!isFirst(shown)) return quiet("Suggested as in the first file with these columns: confirm it there.");
+    const box = h("input", { id: `confirm-${number}`, type: "checkbox", required: true });
+    box.addEventListener("change", () => {
+      for (const reading of together.readings()) reading.confirm(titlesOf(columns));
+    });
+    const sure = `${Math.round(100 * Number(suggestion.confidence))} %`;
+    return h(
+      "div.notice",
+      h("p", h("b", "Suggested, not certain. "), `Confidence ${sure}. It is not read without a question: ${suggestion.why}.`),
+      h("label", box, " The channels, units and rows below are right, for these files"),
+      saving(shown),
+    );
+  }
+
+  /** @type {(titles: string) => void} the suggestion is confirmed, if the file has these columns */
+  function confirm(titles) {
+    if (!preview?.suggestion || titlesOf(preview.columns) !== titles) return;
+    time = preview.suggestion.time;
+    edit(() => {});
   }
 
   function channelsLack() {
@@ -124,7 +167,7 @@ export function importer(file, number, run) {
       return { channel: /** @type {RigColumn["channel"]} */ (value), unit: null, stated: null };
     });
     const list = select(attributes, [["", "left out"], ...options], column.channel ?? "");
-    return h("div", list, column.in_part ? h("p", "Check: its title was recognised only in part.") : null);
+    return list;
   }
 
   /** @type {(column: PreviewColumn, index: number, units: string[]) => HTMLSelectElement | string} */
@@ -196,7 +239,7 @@ export function importer(file, number, run) {
   }
 
   /** @param {Preview} shown */
-  function saving({ profile, missing, problem }) {
+  function saving({ profile, missing, problem, suggestion }) {
     if (rig() !== null) return quiet("The next file with these columns is read the same way.");
 
     pattern.value ||= profile.file_name ?? "";
@@ -208,6 +251,7 @@ export function importer(file, number, run) {
         chosen = null;
         if (preview) preview.rig = kept.name;
         await look();
+        for (const other of together.readings()) if (other.rig() === null) await other.look();
       } catch (refused) {
         answer.replaceChildren(problemView(refused));
       }
@@ -215,19 +259,34 @@ export function importer(file, number, run) {
     const ready = problem === null && !channelsLack() && !missing.includes("kind");
     return h(
       "fieldset.saving",
-      h("legend", "Read the next file the same way"),
+      h("legend", suggestion ? "Or keep this reading for all files of the rig" : "Read the next file the same way"),
       h(
         "div.fields",
         field(rigName, "Name of the rig"),
-        field(pattern, "File names", h("small", "{cycles} stands for the duty cycles, * for any other text")),
+        field(pattern, "File names", h("small", "{cycles} is the duty cycles, {clutch_id} the clutch, * any text")),
       ),
-      button("Save as rig profile", save, { disabled: !ready }),
+      button(suggestion ? "Confirm and save as rig profile" : "Save as rig profile", save, { disabled: !ready }),
       answer,
     );
   }
 
-  return { lead, element, decided, rig, look, sent };
+  return {
+    lead,
+    element,
+    decided,
+    rig,
+    look,
+    sent,
+    confirm,
+    titles: () => preview && titlesOf(preview.columns),
+    time: () => (chosen === null ? "" : time),
+    /** The clutch that the name or the title block says. */
+    clutch: () => preview?.clutch_id ?? preview?.suggested_run.clutch_id ?? null,
+  };
 }
+
+/** @param {PreviewColumn[]} columns */
+const titlesOf = (columns) => columns.map(({ title }) => title).join("\n");
 
 /**
  * The record with what is cut of it, or the plateaus; null where nothing is read.

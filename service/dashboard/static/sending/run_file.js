@@ -4,11 +4,12 @@ import { clutchPath, Problem, send } from "../shared/api.js";
 import { field, h, quiet, select } from "../shared/dom.js";
 import { fixed, kindName } from "../shared/format.js";
 import { problemView } from "../shared/problem_view.js";
-import { guess } from "./file_name.js";
 import { importer } from "./importer.js";
 import { outcomeOf, receiptView } from "./receipt.js";
 
 /** @typedef {Record<string, unknown> & { kind: string, cycles?: number, clutch_id?: string }} JsonRun a run as the API takes it */
+/** @import { Together } from "./importer.js" */
+
 /** @typedef {Record<string, string>} Listed what a list of runs (`runs.json`) says of a file */
 /** @type {[string, string][]} */
 const KINDS = [
@@ -28,25 +29,34 @@ let count = 0;
 /**
  * @param {File} file
  * @param {JsonRun | null} json what a JSON file holds but its channels
+ * @param {Together} together the files that came with it
  * @param {Listed} [listed]
  */
-export function runFile(file, json, listed) {
+export function runFile(file, json, together, listed) {
   const number = (count += 1);
-  const byName = guess(file.name);
-  const kind = select({ id: `kind-${number}`, required: true }, KINDS, listed?.kind ?? byName.kind ?? "");
+  const kind = select({ id: `kind-${number}`, required: true }, KINDS, listed?.kind ?? "");
   const numeric = { type: "number", min: 0, step: "any", required: true, inputmode: "decimal" };
-  const cycles = h("input", { id: `cycles-${number}`, value: listed?.cycles ?? byName.cycles, ...numeric });
+  const cycles = h("input", { id: `cycles-${number}`, value: listed?.cycles ?? "", ...numeric });
   let clutch = "";
+  const hints = { kind: h("small"), cycles: h("small") };
+  /** @type {(field: HTMLInputElement | HTMLSelectElement, hint: HTMLElement, value: string) => void} until it is changed */
+  const suggest = (field, hint, value) => {
+    if (field.value !== "") return;
+    field.value = value;
+    hint.textContent = "suggested by the files’ names and title blocks";
+    field.addEventListener("input", () => hint.replaceChildren(), { once: true });
+  };
+  /** What the names and the cells above the tables suggest is filled in where nothing is. */
+  const suggested = (/** @type {SuggestedRun} */ run) => {
+    if (run.kind !== null) suggest(kind, hints.kind, run.kind);
+    if (run.cycles !== null) suggest(cycles, hints.cycles, String(run.cycles));
+  };
   /** How a file that says nothing of its run itself is read. */
-  const reading = json || listed ? null : importer(file, number, { kind, cycles, clutch: () => clutch });
+  const fieldsOf = { kind, cycles, clutch: () => clutch, suggested };
+  const reading = json || listed ? null : importer(file, number, fieldsOf, together);
   const outcome = h("div.outcome");
   const remark = h("p.remark", { role: "status" });
-  /** @param {unknown} guessed */
-  const guessedOf = (guessed) => !listed && guessed !== null && h("small", "as the file's name says");
-  const asked = [
-    field(kind, "Kind of test", guessedOf(byName.kind)),
-    field(cycles, "Duty cycles since new", guessedOf(byName.cycles)),
-  ];
+  const asked = [field(kind, "Kind of test", hints.kind), field(cycles, "Duty cycles since new", hints.cycles)];
   const fields = h("fieldset.fields", json ? null : asked);
   const says = json ? ` · ${kindName(json.kind)} at ${fixed(json.cycles)} cycles` : "";
   const element = h(
@@ -93,12 +103,13 @@ export function runFile(file, json, listed) {
     const { run_id, origin, started_at, map } = listed ?? {};
     const query = new URLSearchParams({ kind: kind.value, cycles: cycles.value });
     query.set("filename", file.name.slice(-200));
-    const more = { map, rig: reading?.rig(), run_id, origin, started_at };
+    const more = { map, rig: reading?.rig(), time: reading?.time(), run_id, origin, started_at };
     for (const [key, value] of Object.entries(more)) if (value) query.set(key, value);
     return `${clutchPath(id)}/runs/file?${query}`;
   }
 
   const run = {
+    name: file.name,
     json,
     reading,
     element,

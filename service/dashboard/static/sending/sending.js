@@ -1,12 +1,12 @@
 // Sending runs: files that are dropped or chosen go in; for each its receipt, or every place where it is wrong, comes out.
 // Open this file first: the dialog, which taking.js loads. Then batch.js (which files are runs), run_file.js (one of them),
-// file_name.js (what its name says), importer.js (how it is read), registration.js (a clutch that is not known yet) and
+// importer.js (how it is read), registration.js (a clutch that is not known yet) and
 // receipt.js (what the service made of a run).
 
 import { clutchPath, Problem, read } from "../shared/api.js";
 import { answered, button, field, form, h } from "../shared/dom.js";
 import { attempted } from "../shared/problem_view.js";
-import { batchOf } from "./batch.js";
+import { batchOf, byOrder } from "./batch.js";
 import { IDENTIFIER, register } from "./registration.js";
 import { registeredLike, similarRegistered } from "./similar_names.js";
 
@@ -23,6 +23,7 @@ function open(batch, page) {
   const naming = { required: true, list: "registered", spellcheck: "false", ...IDENTIFIER };
   const clutch = h("input", { id: "to", value: page.clutch ?? namedIn(batch), ...naming });
   const suggestions = h("datalist", { id: "registered" });
+  const hint = h("small");
   const answer = h("div.answer", { role: "status" });
   const go = h("button.main");
   const submit = async () => {
@@ -33,7 +34,7 @@ function open(batch, page) {
   const elements = runs.map((run) => run.element);
   const typed = form(
     submit,
-    h("div.fields", field(clutch, "Clutch", suggestions)),
+    h("div.fields", field(clutch, "Clutch", [hint, suggestions])),
     wrong.length > 0 ? notRuns(wrong) : "",
     h("div.listed", elements),
     answer,
@@ -66,9 +67,19 @@ function open(batch, page) {
    */
   async function look() {
     for (const { reading } of runs) await reading?.look();
+    suggestClutch();
     const decided = runs.length > 0 && wrong.length === 0 && runs.every(({ reading }) => reading?.decided());
     const untouched = !closed() && runs.every(({ progress }) => progress === "waiting");
     if (decided && untouched && clutch.value === page.clutch) typed.requestSubmit();
+  }
+
+  /** The clutch that the files' names or title blocks say, if they agree, where none is named. */
+  function suggestClutch() {
+    const ids = new Set(runs.flatMap(({ reading }) => reading?.clutch() ?? []));
+    if (clutch.value !== "" || ids.size !== 1) return;
+    [clutch.value] = ids;
+    hint.textContent = "suggested by the files’ names and title blocks";
+    typedName();
   }
 
   function showGo() {
@@ -87,7 +98,7 @@ function open(batch, page) {
 
   /** @param {string} id */
   async function sendAll(id) {
-    const all = left();
+    const all = left().sort(byOrder);
     let held = 0;
     for (const run of all) {
       if (closed()) return;
@@ -118,7 +129,10 @@ function open(batch, page) {
     return chosen;
   }
 
-  clutch.addEventListener("input", typedName);
+  clutch.addEventListener("input", () => {
+    hint.replaceChildren();
+    typedName();
+  });
   typedName();
   showGo();
   void answered(dialog, () => null);

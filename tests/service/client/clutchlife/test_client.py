@@ -18,6 +18,7 @@ from service.client.clutchlife.answers import RefusedError, ServiceAwayError, re
 from service.client.clutchlife.tables import Frames, table
 from service.client.clutchlife.transport import Service
 from tests.service.cli.sending.stand_in_service import URL
+from tests.service.web.test_import_preview import foreign
 from tests.support import Server, serving, stationary
 
 ROOT = Path(__file__).parents[4]
@@ -49,6 +50,21 @@ def test_tables_are_frames_where_pandas_is_there_and_other_answers_those_of_the_
     assert answer["at_least"] > 0
     planned = client.forecast("e", [{"cycles": 1000}], pace_cycles_per_hour=100)
     assert planned["pace_from"] == "request"
+
+
+def test_a_suggestion_is_confirmed_and_kept_for_the_rig(client: Client, tmp_path: Path) -> None:
+    client.register("KL-4712")
+    first, second = tmp_path / "KL-4712_01500.csv", tmp_path / "KL-4712_03000.csv"
+    for path in (first, second):
+        path.write_bytes(foreign())
+    with pytest.raises(RefusedError) as caught:
+        client.post_run("KL-4712", first)
+    assert caught.value.suggestion is not None
+    assert caught.value.suggestion["map"]["torque_nm"] == "Couple FZG"
+    assert client.confirm_suggestion("KL-4712", first, caught.value, rig="bench-fr")["cycles"] == 1500
+    assert client.post_run("KL-4712", second, rig="bench-fr")["cycles"] == 3000
+    with pytest.raises(ValueError, match="no suggestion"):
+        client.confirm_suggestion("KL-4712", first, RefusedError(422, {}))
 
 
 def test_held_runs_are_confirmed_together(client: Client) -> None:

@@ -1,0 +1,309 @@
+"""A complete reading of a file that is not read without a question, for a person to confirm: columns, units, clock, marks.
+
+In: a table, how it was asked to be read. Out: how it may be read, with a confidence, or nothing. What is proposed was tried:
+the file can be read so. Nothing here is ever used to read a file that nobody has confirmed.
+"""
+
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import PurePath
+
+import numpy as np
+
+from models.arrays import FloatArray
+from service.channels import CHANNELS
+from service.errors import FieldError, InvalidError
+from service.readers.assemble import as_seconds, runs_on, to_channels
+from service.readers.column_names import choices_of, like_a_time
+from service.readers.constants import stacked_columns, value_within
+from service.readers.limits import Limits
+from service.readers.long_table import widened
+from service.readers.meanings import MEANS, SYMBOLS, Sense, has_noun, is_another, is_short_for, meaning, measures, words
+from service.readers.numerals import is_stamp, plain, read_cells
+from service.readers.table import COLUMNS, NO_TIME, SHEETS, ColumnChoice, FileColumn, Reading, Table, labels, marks
+from service.readers.unit_table import conversion, is_unit
+
+#: The channels that every test needs.
+_NEEDED = ("torque_nm", "speed_rpm", "pressure_bar")
+#: How sure a column's name makes of its channel. Chosen; by a draw of files (tests/lab/files).
+_SURE = {Sense.WHOLE: 1.0, Sense.FOREIGN: 0.98, Sense.PART: 0.8}
+#: The same of a name that says nothing: short for the channel, with a unit of it; a unit alone; short, or with a letter for
+#: it (`T_clutch`), without a unit.
+_SHORT_IN_UNIT, _UNIT_ALONE, _SHORT_ALONE, _SYMBOL_ALONE = 0.75, 0.6, 0.4, 0.3
+#: A rival that is so likely beside the best column makes this of its confidence. Chosen.
+_RIVAL, _WITH_RIVAL = 0.8, 0.6
+#: What is left of the confidence after each thing that only its values suggest. Chosen.
+_UNIT_BY_SIZE, _CONSTANT, _MARK, _SIGN, _CLOCK, _FIRST_OF_SEVERAL = 0.7, 0.8, 0.9, 0.7, 0.8, 0.5
+#: Units that a channel may be in, and the sizes that its largest values may have in the channel's own. Chosen: wide.
+_SIZES: Mapping[str, tuple[tuple[str, ...], float, float]] = {
+    "pressure_bar": (("bar", "kPa", "MPa", "mbar", "Pa"), 0.2, 80.0),
+    "torque_nm": (("Nm", "kNm", "Nmm"), 0.3, 5000.0),
+    "speed_rpm": (("rpm", "1/s"), 5.0, 20_000.0),
+    "oil_temperature_c": (("°C", "K"), -40.0, 220.0),
+}
+#: Steps of a time without a unit that are milliseconds, s. Chosen: no rig samples every two seconds for thousands of rows.
+_MS_STEPS, _MANY_ROWS = 2.0, 500
+#: Things that are mended one after the other.
+_MAX_STEPS = 6
+_MARK_NAMED = re.compile(r"missing=(\S+?)(?:;| to )")
+_UNIT_NAMED = re.compile(r"may be (\S+): state it with map=(\w+):")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Proposal:
+    """How a file may be read, and how sure that is, 0 to 1; `titles`: all columns of the file as a profile names them."""
+
+    reading: Reading
+    confidence: float
+    titles: tuple[str, ...] = ()
+
+
+def propose(
+    read_table: Callable[[Reading], Table], reading: Reading, limits: Limits, filename: str = ""
+) -> Proposal | None:
+    """The reading by which the file gives the channels of a test; None where none is found. `read_table` reads its table.
+
+    Raises TooLargeError as reading does.
+    """
+    confidence, asked, clock = 1.0, reading, False
+    for _ in range(_MAX_STEPS):
+        try:
+            table = read_table(asked)
+            named, sure = _named(table, asked, filename, clock=clock)
+            found = to_channels(table, named, limits).columns.keys() >= {*_NEEDED}
+        except InvalidError as error:
+            wrong = error.errors[0] if error.errors else None
+            if wrong is not None and wrong.code == "ambiguous" and wrong.pointer == "/time" and not clock:
+                clock, confidence = True, min(confidence, _CLOCK)  # which of several times
+                continue
+            mended = None if wrong is None else _mended(wrong, error.detail, asked, read_table, limits, filename)
+            if mended is None or mended[0] == asked:
+                return None
+            asked, confidence = mended[0], min(confidence, mended[1])
+        else:
+            certain = round(min(confidence, sure), 2)
+            return Proposal(reading=named, confidence=certain, titles=_titles(table, named)) if found else None
+    return None
+
+
+def _titles(table: Table, reading: Reading) -> tuple[str, ...]:
+    """All columns as a profile names them."""
+    wide, _ = widened(stacked_columns(table, reading), reading)
+    return tuple(_title(own) for own in wide.columns if own.name and not own.name.startswith("="))
+
+
+# --- columns ---
+
+
+def _named(table: Table, asked: Reading, filename: str, *, clock: bool) -> tuple[Reading, float]:
+    """The reading with a column for each channel that has one, and the confidence of that; `clock`: one of several times
+    too."""
+    stacked = stacked_columns(table, asked)
+    wide, wide_reading = widened(stacked, asked)
+    mapping, confidence = dict(asked.mapping), 1.0
+    least = 1.0 if {*_NEEDED} <= mapping.keys() else 0.0  # a caller who named them all wants no other guess
+    given = {choice.column for choice in choices_of(asked).values()}
+    free = {
+        at: own for at, own in enumerate(wide.columns) if own.name and not {own.title, own.name, _title(own)} & given
+    }
+    for channel in (*_NEEDED, *(name for name in CHANNELS if name not in (*_NEEDED, "time_s"))):
+        scores = {at: _likelihood(own, channel) for at, own in free.items()} if channel not in mapping else {}
+        at, sure = _best({at: score for at, score in scores.items() if score > 0 and score >= least})
+        if at is not None:
+            mapping[channel], by_size = _choice(wide, at, channel, wide_reading)
+            confidence = min(confidence, sure, by_size) if channel in _NEEDED else confidence
+            del free[at]
+    if "pressure_bar" not in mapping and (constant := _constant(wide, filename)):
+        mapping["pressure_bar"] = ColumnChoice(column=constant)
+        confidence = min(confidence, _CONSTANT)
+        if constant == COLUMNS:
+            return _named(table, replace(asked, mapping=_only(asked, constant)), filename, clock=clock)
+    named = replace(asked, mapping=mapping)
+    if wide is not stacked or asked.time or "time_s" in mapping:
+        return named, confidence
+    at, sure = _time(wide, free, wide_reading, needed=clock)
+    if at is None:
+        return named, confidence
+    mapping["time_s"], by_size = _choice(wide, at, "time_s", wide_reading)
+    return replace(asked, mapping=mapping), min(confidence, sure, by_size)
+
+
+def _only(asked: Reading, constant: str) -> dict[str, ColumnChoice]:
+    return {**asked.mapping, "pressure_bar": ColumnChoice(column=constant)}
+
+
+def _title(column: FileColumn) -> str:
+    """A column's name as a profile has it."""
+    return f"{column.group}/{column.name}" if column.group else column.name
+
+
+def _likelihood(column: FileColumn, channel: str) -> float:
+    """How probable it is by its name and its unit that a column holds a channel."""
+    of, sense = meaning(column.name, column.unit)
+    if column.unit is None and _ends_in_another_unit(channel, column.name):
+        return 0.0
+    if of is None and column.unit is None:  # what it may be, if it is in the channel's unit
+        assumed = meaning(column.name, CHANNELS[channel].unit)
+        if has_noun(channel, column.name) or is_short_for(channel, column.name):
+            of, sense = (channel, Sense.PART) if assumed[1] is Sense.UNKNOWN or assumed[0] == channel else assumed
+    fits = measures(channel, column.unit)
+    if sense is Sense.OTHER or is_another(column.name) or is_another(column.group) or (column.unit and not fits):
+        return 0.0
+    score = _SURE.get(sense, 0.0) if of == channel else 0.0
+    if of != channel and channel in _NEEDED and sense is Sense.UNKNOWN:
+        short = is_short_for(channel, column.name)
+        symbol = any(channel in SYMBOLS.get(word, ()) for word in words(column.name))
+        alone = _SHORT_ALONE if short else _SYMBOL_ALONE if symbol else 0.0
+        score = (_SHORT_IN_UNIT if short else _UNIT_ALONE) if fits else alone
+    return score * (0.6 if MEANS & {*words(column.name)} else 1.0)
+
+
+def _ends_in_another_unit(channel: str, name: str) -> bool:
+    """Whether the last word of a name is a unit of something else (`Axial_Force_kN`)."""
+    *others, last = re.split(r"[\s_]+", name.strip())
+    return bool(others) and is_unit(last) and _unit_at_the_end(channel, name) is None
+
+
+def _unit_at_the_end(channel: str, name: str) -> str | None:
+    """A unit of a channel that is the last word of a name, whatever its capitals (`pressure_mpa`)."""
+    *others, last = re.split(r"[\s_]+", name.strip())
+    return next((unit for unit in (last, last.upper()) if others and conversion(channel, unit)), None)
+
+
+def _best(scores: Mapping[int, float]) -> tuple[int | None, float]:
+    """The likeliest column, the first of equal ones, and its confidence beside its rivals."""
+    if not scores:
+        return None, 1.0
+    at = max(scores, key=lambda place: scores[place])
+    rivals = [score for place, score in scores.items() if place != at and score >= _RIVAL * scores[at]]
+    return at, scores[at] * (_WITH_RIVAL if rivals else 1.0)
+
+
+def _choice(table: Table, at: int, channel: str, reading: Reading) -> tuple[ColumnChoice, float]:
+    """A column with its unit, the one that its values suggest where it states none; and the confidence of that."""
+    column = table.columns[at]
+    title = _title(column)
+    if column.unit is not None or column.name == channel:
+        return ColumnChoice(column=title), 1.0
+    if channel == "time_s" and any(is_stamp(row[at]) for row in table.head[:1] if len(row) > at):
+        return ColumnChoice(column=title), 1.0
+    if unit := _unit_at_the_end(channel, column.name):
+        return ColumnChoice(column=title, unit=unit), _UNIT_BY_SIZE
+    values = plain(read_cells(table, {at: channel}, reading)[at])
+    return ColumnChoice(column=title, unit=_unit_by_size(channel, values)), _UNIT_BY_SIZE
+
+
+def _unit_by_size(channel: str, values: FloatArray) -> str:
+    """The first unit in which values [n] have a size that the channel may have; its own where none fits."""
+    finite = values[np.isfinite(values)]
+    if channel == "time_s":
+        steps = np.diff(finite)
+        return "ms" if finite.size > _MANY_ROWS and steps.size and np.median(steps) >= _MS_STEPS else "s"
+    if channel not in _SIZES or finite.size == 0:
+        return CHANNELS[channel].unit
+    units, least, most = _SIZES[channel]
+    large = float(np.quantile(np.abs(finite), 0.9))
+    for unit in units:
+        converted = conversion(channel, unit)
+        if converted is not None and least <= large * converted.factor + converted.offset <= most:
+            return unit
+    return CHANNELS[channel].unit
+
+
+def _time(table: Table, free: Mapping[int, FileColumn], reading: Reading, *, needed: bool) -> tuple[int | None, float]:
+    """The column that is the time, and how sure; none where the file's own names or clocks say it, and no choice is
+    `needed`."""
+    whole = [at for at, own in free.items() if meaning(own.name, own.unit) == ("time_s", Sense.WHOLE)]
+    stated = any(column.clock is not None for column in table.columns)
+    unitless = len(whole) == 1 and free[whole[0]].unit is None
+    if not needed and not unitless and (whole or stated):
+        return None, 1.0
+    scores = {}
+    for at in whole or [at for at, own in free.items() if like_a_time(own) or is_short_for("time_s", own.name)]:
+        read = read_cells(table, {at: "time_s"}, reading)[at]
+        if runs_on(as_seconds(free[at], read)):
+            of, sense = meaning(free[at].name, free[at].unit)
+            scores[at] = _SURE.get(sense, 0.0) if of == "time_s" else _UNIT_ALONE
+    return _best(scores)
+
+
+def _constant(table: Table, filename: str) -> str | None:
+    """Where a pressure stands that no column holds: in the titles of columns, above the table, or in the file's name."""
+    within = [value_within(column.name, "pressure_bar") for column in table.columns]
+    if len({held[0] for held in within if held}) > 1:
+        return COLUMNS
+    for label, text in labels(table.above).items():
+        name = label.rstrip(":= ")
+        of, sense = meaning(re.sub(r"[\[(].*", "", name).strip())
+        if of == "pressure_bar" and sense in _SURE and re.match(r"[+-]?\d+(?:[.,]\d+)?\s*\S{0,6}$", text):
+            return f"={name}"
+    held = value_within(PurePath(filename).stem.replace("_", " ").replace("-", " "), "pressure_bar")
+    return f"={held[0]:g} bar" if held else None
+
+
+# --- what is wrong besides ---
+
+
+def _mended(
+    wrong: FieldError,
+    detail: str,
+    asked: Reading,
+    read_table: Callable[[Reading], Table],
+    limits: Limits,
+    filename: str,
+) -> tuple[Reading, float] | None:
+    """The reading with what a refusal asks for, and the confidence of that; None where nobody but a person knows."""
+    if wrong.code == "which_table" and not asked.table:
+        return _table_chosen(wrong.value, asked, read_table)
+    if wrong.code == "perhaps_the_time":
+        return replace(asked, time=wrong.value), _CLOCK
+    if wrong.code == "time_stands" and asked.time != NO_TIME:
+        mapping = {channel: choice for channel, choice in asked.mapping.items() if channel != "time_s"}
+        return replace(asked, time=NO_TIME, mapping=mapping), _FIRST_OF_SEVERAL
+    if wrong.code == "ambiguous_number" and not asked.decimal:
+        return _sign_chosen(asked, read_table, limits, filename)
+    if wrong.code == "which_is_good" and not asked.good:
+        counts = {code: int(rows) for code, rows in re.findall(r"(\S+) in (\d+) rows", detail)}
+        return replace(asked, good=max(counts, key=lambda code: counts[code])), _SIGN
+    if (unit := _UNIT_NAMED.search(detail)) and unit[2] in asked.mapping:
+        choice = replace(asked.mapping[unit[2]], unit=unit[1])
+        return replace(asked, mapping={**asked.mapping, unit[2]: choice}), _UNIT_BY_SIZE
+    if mark := _MARK_NAMED.search(detail):
+        stated = [*marks(asked.missing), *(one for one in marks(mark[1]) if one not in marks(asked.missing))]
+        return replace(asked, missing=",".join(stated)), _MARK
+    return None
+
+
+def _table_chosen(first: str, asked: Reading, read_table: Callable[[Reading], Table]) -> tuple[Reading, float]:
+    """All sheets, where their names state pressures; else the first table."""
+    sheets = replace(asked, mapping=_only(asked, SHEETS))
+    try:
+        read_table(sheets)
+    except InvalidError:
+        return replace(asked, table=first), _FIRST_OF_SEVERAL
+    return sheets, _CONSTANT
+
+
+def _sign_chosen(
+    asked: Reading, read_table: Callable[[Reading], Table], limits: Limits, filename: str
+) -> tuple[Reading, float] | None:
+    """The decimal sign by which values change least from row to row."""
+    changes: dict[str, float] = {}
+    for sign in (",", "."):
+        signed = replace(asked, decimal=sign)
+        try:
+            table = read_table(signed)
+            columns = to_channels(table, _named(table, signed, filename, clock=False)[0], limits).columns
+        except InvalidError:
+            continue
+        changes[sign] = sum(_changes(columns.values()))
+    if not changes:
+        return None
+    return replace(asked, decimal=min(changes, key=lambda sign: changes[sign])), _SIGN
+
+
+def _changes(columns: Iterable[FloatArray]) -> Iterator[float]:
+    """Of each column [n] the mean step of the logarithm of its size."""
+    for column in columns:
+        yield float(np.abs(np.diff(np.log(np.abs(column) + 1e-3))).mean()) if column.size > 1 else 0.0

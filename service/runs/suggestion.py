@@ -1,0 +1,122 @@
+"""A suggestion for a file that is not read without a question: its reading (`readers.suggest`), its kind, cycles and clutch.
+
+In: the file, and what was asked of it. Out: `Suggestion`, complete, for a person to confirm; or nothing.
+"""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, get_args
+
+from models.arrays import FloatArray
+from models.records.cleaning import UnusableRecordError
+from models.records.plateaus import cut_plateaus
+from service.api.rig import ChannelName, FileKindName, RigColumn, RigIn, RigProfile, Suggestion
+from service.clutch.incoming_run import SampledChannels
+from service.errors import InvalidError, ServiceError
+from service.readers.assemble import Channels
+from service.readers.read_file import read_file, suggest_file
+from service.readers.table import ColumnChoice, Reading
+from service.runs.file_names import suggested
+
+#: Rows that are shown.
+_ROWS = 2
+_CHANNELS: Sequence[ChannelName] = get_args(ChannelName)
+
+
+def suggestion_of(
+    path: Path,
+    *,
+    filename: str,
+    reading: Reading,
+    kind: FileKindName | None = None,
+    cycles: float | None = None,
+    beside: Sequence[str] = (),
+    why: str = "",
+) -> Suggestion | None:
+    """How a file may be read; None where nothing is found that gives a test. `beside`: names of files that came with it;
+    `why`: what keeps it from being read.
+    """
+    try:
+        proposal = suggest_file(path, filename=filename, reading=reading)
+        if proposal is None:
+            return None
+        read = read_file(path, filename=filename, reading=proposal.reading)
+    except ServiceError:  # damaged, too large, no table, or busy: the refusal itself stands
+        return None
+    reading = proposal.reading
+    said = suggested(filename, beside, read.labels)
+    kind = kind or said.named.kind or _kind(read.columns)
+    columns = _columns(reading, proposal.titles)
+    profile = RigProfile(
+        columns=columns,
+        decimal="," if reading.decimal == "," else "." if reading.decimal else None,
+        table=reading.table or None,
+        skip_rows=reading.skip_rows,
+        missing=reading.missing or None,
+        good=reading.good or None,
+        kind=kind,
+        file_name=said.file_name,
+        cycles_cell=said.cycles_cell,
+        clutch_cell=said.clutch_cell,
+    )
+    return Suggestion(
+        why=why,
+        map={column.channel: _as_argument(reading.mapping[column.channel]) for column in columns if column.channel},
+        table=reading.table,
+        time=reading.time,
+        decimal=reading.decimal,
+        missing=reading.missing,
+        good=reading.good,
+        kind=kind,
+        cycles=said.named.cycles if cycles is None else cycles,
+        clutch_id=said.named.clutch_id,
+        confidence=proposal.confidence,
+        rows=_rows(read),
+        profile=profile,
+    )
+
+
+def confirmed_profile(path: Path, rig: str, profile: RigProfile | None, **asked: Any) -> RigIn:
+    """The profile of a new rig: the one that was sent, or how a file was read by the arguments that `asked` holds, as
+    `suggestion_of` takes them. Raises InvalidError where the file gives no test by them."""
+    if profile is None:
+        suggestion = suggestion_of(path, **asked)
+        if suggestion is None:
+            message = f"rig {rig!r} is new, and the file gives no test by these arguments that could be its profile"
+            raise InvalidError.of(message, code="no_profile", pointer="/query/rig")
+        profile = suggestion.profile
+    return RigIn(name=rig, **profile.model_dump(include={*RigProfile.model_fields}))
+
+
+def _columns(reading: Reading, titles: Sequence[str]) -> list[RigColumn]:
+    """The columns of a reading, and those of the file that it leaves out."""
+    chosen = {choice.column: (channel, choice.unit) for channel, choice in reading.mapping.items()}
+    listed = [title for title in dict.fromkeys(titles) if title not in chosen]
+    columns = [RigColumn.model_validate({"title": t, "channel": of, "unit": unit}) for t, (of, unit) in chosen.items()]
+    return columns + [RigColumn(title=title) for title in listed]
+
+
+def _as_argument(choice: ColumnChoice) -> str:
+    return choice.column if choice.unit is None else f"{choice.column} [{choice.unit}]"
+
+
+def _rows(read: Channels) -> list[dict[ChannelName, float]]:
+    size = next(iter(read.columns.values())).size
+    return [
+        {name: float(read.columns[name][at]) for name in _CHANNELS if name in read.columns}
+        for at in range(min(_ROWS, size))
+    ]
+
+
+def _kind(columns: Mapping[str, FloatArray]) -> FileKindName:
+    """A record in which nothing stays as it is for a while is a dynamic one."""
+    return "dynamic_stribeck" if "time_s" in columns and holds_no_dwell(columns) else "stationary_stribeck"
+
+
+def holds_no_dwell(columns: Mapping[str, FloatArray]) -> bool:
+    """Whether a record by its times is no stationary test: nothing in it stays as it is for a while."""
+    try:
+        cut_plateaus(SampledChannels(columns))
+    except UnusableRecordError:
+        return True
+    return False
