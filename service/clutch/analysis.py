@@ -22,8 +22,8 @@ from models.records.criteria import UNLOADED
 from models.records.plateaus import cut_plateaus
 from models.records.runs import Curve, Plateaus, curves_by_pressure, loaded
 from models.records.torque_filter import filtered_as_torque
-from service.channels import PASCALS_PER_BAR
-from service.clutch.criteria import FEWEST_SPEEDS, POOR_FIT, WIDE_LEVEL
+from service.channels import PASCALS_PER_BAR, ZERO_CELSIUS
+from service.clutch.criteria import FEWEST_SPEEDS, OTHER_OIL, POOR_FIT, WIDE_LEVEL
 from service.clutch.engagements import Engagement, course_item, engagement_notices, evaluated
 from service.clutch.incoming_run import IncomingRun, SampledChannels, sampled_record, stationary_plateaus
 from service.errors import InvalidError, Notice
@@ -146,6 +146,7 @@ def _analyse_stationary(
     velocities = geometry.sliding_velocity(protocol_speeds(low, high)) if low < high else None
     cofs = {} if velocities is None else mean_cofs(levels, velocities, geometry)
     warnings = [
+        *_oil_moves(under_load),
         *noticed,
         *(notice for level in levels for notice in _level_warnings(level, under_load)),
         *(notice for level in levels for notice in _fit_warnings(level)),
@@ -217,6 +218,20 @@ def _level_warnings(level: LevelFit, plateaus: Plateaus) -> list[Notice]:
         "Were several pressures tested here? Keep them further apart"
     )
     return [Notice(code="wide_level", message=message)]
+
+
+def _oil_moves(plateaus: Plateaus) -> list[Notice]:
+    """Oil whose temperature changes within a test by more than two tests of a life may be apart."""
+    if plateaus.oil_temperature is None:
+        return []
+    low, high = np.quantile(plateaus.oil_temperature, [0.05, 0.95]).tolist()
+    if high - low <= OTHER_OIL:
+        return []
+    message = (
+        f"the oil went from {low - ZERO_CELSIUS:.0f} to {high - ZERO_CELSIUS:.0f} °C within this test, so its curves mix "
+        f"temperatures. First bring the oil to one temperature, within {OTHER_OIL:g} °C, and repeat the test"
+    )
+    return [Notice(code="oil_temperature_moves", message=message)]
 
 
 def _unloaded(plateaus: Plateaus, under_load: Plateaus | None) -> list[Notice]:

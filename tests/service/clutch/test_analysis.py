@@ -300,3 +300,45 @@ def test_a_clock_that_is_set_forwards_is_said_of_a_dynamic_test(client: TestClie
         in missing["message"]
     )
     assert post_run(client, swing(late=False) | {"run_id": "even"})["warnings"] == []
+
+
+# --- Sensors: a torque at its limit, oil that warms up within a test.
+
+
+def four_pressures(decimals: int, limit: float | None, seed: int = 5) -> dict[str, Any]:
+    """A test at four pressures with 0.6 % noise, its torque rounded to so many decimals and cut off at a limit [Nm]."""
+    body = stationary(pressures=(2.0, 3.0, 4.0, 5.0), run_id=f"t{decimals}-{limit}-{seed}")
+    torque = np.array(body["channels"]["torque_nm"])
+    torque = torque * (1 + 0.006 * np.random.default_rng(seed).standard_normal(torque.size))
+    body["channels"]["torque_nm"] = np.round(torque if limit is None else np.minimum(torque, limit), decimals).tolist()
+    return body
+
+
+def test_one_of_four_pressures_at_the_limit_of_torque_is_doubted_and_honest_ones_are_not(client: TestClient) -> None:
+    top = np.array(four_pressures(6, None)["channels"]["torque_nm"])[-len(SPEEDS_RPM) :]
+    all_of_it, some = float(top.min()) - 0.1, float(np.quantile(top, 0.6))
+    for limit in (all_of_it, some):
+        receipt = client.post("/v1/clutches/c1/runs", json=four_pressures(6, limit)).json()
+        (doubt,) = receipt["doubts"]
+        assert (receipt["state"], doubt["code"]) == ("held", "dead_channel")
+        assert f"exactly {limit:.4g} Nm" in doubt["message"]
+        assert "5 bar" in doubt["message"]
+    for decimals in (0, 1, 2, 6):
+        for seed in range(5):
+            receipt = client.post("/v1/clutches/c1/runs", json=four_pressures(decimals, None, seed)).json()
+            assert receipt["state"] == "accepted", receipt["doubts"]
+
+
+def test_oil_that_warms_up_within_a_test_is_the_first_thing_to_mend(client: TestClient) -> None:
+    body = stationary(pressures=(5.0,), run_id="t")
+    torque = np.array(body["channels"]["torque_nm"])
+    body["channels"]["oil_temperature_c"] = np.linspace(40.0, 80.0, torque.size).tolist()
+    body["channels"]["torque_nm"] = (torque * np.linspace(1.2, 1.0, torque.size) ** 3).tolist()
+    receipt = post_run(client, body)
+    first = receipt["warnings"][0]
+    assert first["code"] == "oil_temperature_moves"
+    assert "42 to 78 °C" in first["message"]
+    assert "First bring the oil to one temperature" in first["message"]
+    body["run_id"], body["cycles"] = "steady", 10
+    body["channels"]["oil_temperature_c"] = np.linspace(80.0, 89.0, torque.size).tolist()
+    assert "oil_temperature_moves" not in {each["code"] for each in post_run(client, body)["warnings"]}
