@@ -7,7 +7,7 @@ import { Chart, choice } from "../charts/chart.js";
 import { column, CYCLES, KIND } from "../charts/columns.js";
 import { PARAMETER_NAMES } from "../charts/parameters.js";
 import { spread } from "../charts/stribeck.js";
-import { curveOf, xyOf } from "../charts/stribeck_law.js";
+import { curveOf, highestOf, xyOf } from "../charts/stribeck_law.js";
 import { planar, titled } from "../charts/traces.js";
 import { levelsOf, optionsOf, QUANTITIES, titleOf, usual } from "../quantities/names.js";
 import { clutchPath, read, readAll } from "../shared/api.js";
@@ -129,7 +129,7 @@ function curvesOf(lives, share) {
       return fit ? [{ fit, cycles: cycles - (answer.life.from_cycles ?? 0) }] : [];
     });
     const states = fits.map(({ fit, cycles }) => ({ fit, cycles, drawn: curveOf(fit, clutch, 0, 2000) }));
-    const unit = share && states.length > 0 ? Math.max(...states[0].drawn.map(({ torque: nm }) => nm)) : 1;
+    const unit = share && states.length > 0 ? highestOf(states[0].drawn) : 1;
     return states.map(({ fit, cycles, drawn: points }, state) => ({
       name: `${label}, ${fixed(cycles)} cycles, ${pressureText(level)}`,
       index,
