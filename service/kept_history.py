@@ -14,8 +14,8 @@ from functools import reduce
 import numpy as np
 from sqlalchemy import Connection
 
-from models.friction.criteria import ACCEPTABLE_MSE
 from models.friction.identification import StribeckFit, StribeckFitStatus
+from models.friction.measured_curve import MeasuredCurve
 from models.friction.stribeck import PARAMETER_NAMES, StribeckParameters
 from service.clutch.analysis import LevelFit
 from service.clutch.timeline import (
@@ -40,7 +40,7 @@ FOLLOWS = "follows"
 #: the sizes of their objects, rounded up.
 _RUN, _COF, _DRAW, _FIT = 1_500, 250, 32, 2_500
 #: Columns of a stored fit that are a fit's own.
-FIT_COLUMNS = ("pressure", "undetermined", "noise", "mse_percent", "rmse", "points", "message")
+FIT_COLUMNS = ("pressure", "undetermined", "noise", "mse_percent", "rmse", "acceptable", "points", "message")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -183,9 +183,9 @@ def level_fit(row: FitRow) -> LevelFit:
         covariance=np.reshape(row.covariance, (4, 4)),
         unbiased_covariance=np.reshape(row.unbiased_covariance, (4, 4)),
         status=StribeckFitStatus(row.status),
-        acceptable=row.mse_percent is not None and row.mse_percent < ACCEPTABLE_MSE,
     )
-    return LevelFit(mean_pressure=row.mean_pressure, speeds=row.speeds, fit=fit)
+    measured = None if row.measured is None else MeasuredCurve.of_columns(np.reshape(row.measured, (3, -1)), row.noise)
+    return LevelFit(mean_pressure=row.mean_pressure, speeds=row.speeds, fit=fit, measured=measured)
 
 
 def _new_levels(row: ClutchRow) -> frozenset[str]:

@@ -415,6 +415,7 @@ def fit_rows(own: Sequence[LevelFit], cofs: ByPressure) -> list[FitRow]:
             mean_cof=mean_cof,
             mean_cof_sd=mean_cof_sd,
             code_version=CODE_VERSION,
+            measured=None if level.measured is None else tuple(level.measured.columns().ravel().tolist()),
         )
         rows.append(row)
     return rows

@@ -25,7 +25,8 @@ from storage.tables import filter_state, fit, prediction, run
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FitRow:
     """One curve's fit. `covariance` is the 4 x 4 matrix, row by row, 16 numbers, and so is `unbiased_covariance`;
-    `mse_percent` None on a flat curve.
+    `mse_percent` None on a flat curve. `measured`, where the static torque is open: the measured points' velocities, then
+    their torques, then how many rows each stands for.
 
     `mean_cof` and its deviation, None where the curve does not determine them, are over the protocol of the first test.
     """
@@ -49,6 +50,8 @@ class FitRow:
     mean_cof_sd: float | None
     message: str
     code_version: str
+    acceptable: bool
+    measured: tuple[float, ...] | None = None
 
 
 _MATRICES = ("covariance", "unbiased_covariance")

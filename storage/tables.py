@@ -139,6 +139,8 @@ fit = Table(
     *_optional(NUMBER, "mean_cof", "mean_cof_sd"),
     *_required(TEXT, "message", "code_version"),
     Column("unbiased_covariance", TEXT),
+    Column("acceptable", WHOLE, nullable=False, server_default=text("0")),
+    Column("measured", TEXT),
     _checksum(),
 )
 

@@ -47,7 +47,7 @@ from scipy.special import chdtri, stdtrit
 
 from models.arrays import FloatArray
 from models.friction import criteria
-from models.friction.criteria import ACCEPTABLE_MSE, ASSUMED_NOISE
+from models.friction.criteria import ACCEPTABLE_ERROR, ACCEPTABLE_MSE, ASSUMED_NOISE
 from models.friction.stribeck import (
     GAMMA,
     PARAMETER_NAMES,
@@ -236,8 +236,8 @@ class StribeckFit:
     covariance [4, 4] in the order of PARAMETER_NAMES, finite always, is as wide as the interval of one test needs it;
     unbiased_covariance [4, 4] is that of the errors in the mean over tests, for who takes many together, where all four are
     determined (else both are as wide as what the data leave open); noise [Nm]: the deviation of a point; mse_percent: eq. 5,
-    unweighted, on torque folded to v >= 0, None where that does not vary; rmse [Nm]; acceptable: mse_percent < 5;
-    undetermined: names of parameters.
+    unweighted, on torque folded to v >= 0, None where that does not vary; rmse [Nm]; acceptable: mse_percent < 5, or rmse
+    within what the scatter from point to point explains (`_within_noise`); undetermined: names of parameters.
     """
 
     pressure: float
@@ -428,10 +428,28 @@ def _describe(
         noise=float(noise.sd[row]) * sd_share * folded.torque_scale,
         mse_percent=mse,
         rmse=math.sqrt(mean_square) * folded.torque_scale,
-        acceptable=mse is not None and mse < ACCEPTABLE_MSE,
+        acceptable=(mse is not None and mse < ACCEPTABLE_MSE) or _within_noise(folded, miss),
         points=folded.speed.size,
         message=_message(folded, undetermined, at_zero, noise, row),
     )
+
+
+def _within_noise(folded: _Folded, miss: FloatArray) -> bool:
+    """Whether the errors [n] are no more than the noise of the points leaves.
+
+    The noise is Σ (e_i+1 - e_i)²/2(n - 1) over errors by speed: what the law misses is smooth along it and hardly changes
+    from point to point; a deviation that was given counts where it is more. Too few speeds show nothing of it, and noise
+    that is large beside the torque is no excuse.
+    """
+    if folded.distinct <= len(PARAMETER_NAMES):
+        return False
+    steps = np.diff(miss[np.argsort(folded.speed, kind="stable")])
+    variance = float((steps**2).mean()) / 2
+    if folded.known_noise is not None:
+        variance = max(variance, folded.known_noise**2 * float((folded.weight**-2.0).mean()))
+    rounding = 1e-12
+    most = min(ACCEPTABLE_ERROR**2 * variance, ASSUMED_NOISE**2 * float((folded.torque**2).mean()))
+    return float((miss**2).mean()) <= most + rounding
 
 
 def _undetermined(folded: _Folded, too_wide: NDArray[np.bool_]) -> tuple[str, ...]:

@@ -10,8 +10,12 @@ together achieve is held by `tests/statistical/test_plateaus.py`.
 LEVEL_GAP, LEVEL_GAP_SHARE = 0.12e5, 0.025
 #: Below this [Pa] the clutch is open: what is measured does not depend on the lining's friction.
 UNLOADED = 0.05e5
-#: A level within 0.02 bar of a multiple of this [Pa] is called by that multiple.
+#: Pressures that repeat are levels of their own where they are so far apart [Pa]; closer ones are counts of one sensor.
 LEVEL_STEP = 0.05e5
+#: A level is called by the nearest multiple of the first of these [Pa] that is within 0.02 bar, or this share of it: 9.977
+#: bar is 10. Chosen: the error of a gauge of class 0.4.
+LEVEL_NAMES = (1e5, 0.5e5, 0.1e5, 0.05e5)
+NAMED_WITHIN, NAMED_WITHIN_SHARE = 0.02e5, 0.004
 
 #: A record is refused that has fewer samples, values beyond this in SI units, or samples that lie nearer or farther [s].
 FEWEST_SAMPLES, LARGEST_VALUE, FASTEST, SLOWEST = 16, 1e15, 1e-6, 10.0

@@ -10,7 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
-from models.records.criteria import LEVEL_GAP, LEVEL_GAP_SHARE, LEVEL_STEP, MEDIAN_DURATION, SHORTEST_STRETCH
+from models.records.criteria import (
+    LEVEL_GAP,
+    LEVEL_GAP_SHARE,
+    LEVEL_NAMES,
+    LEVEL_STEP,
+    MEDIAN_DURATION,
+    NAMED_WITHIN,
+    NAMED_WITHIN_SHARE,
+    SHORTEST_STRETCH,
+)
 from models.records.outliers import leading, running_median
 from models.records.periods import sample_interval
 
@@ -24,11 +33,13 @@ def levels_of(pressure: FloatArray) -> FloatArray:
     """The level [n] Pa of each measured pressure [n] Pa: equal values, same level.
 
     Sorted pressures are cut where neighbours lie further apart than LEVEL_GAP (or LEVEL_GAP_SHARE); where every distinct
-    value occurs in three rows or more, pressures are nominal already and each distinct value is a level.
+    value occurs in three rows or more, and neighbours are a LEVEL_STEP apart, pressures are nominal already and each
+    distinct value is a level.
     """
     distinct, inverse, counts = np.unique(pressure, return_inverse=True, return_counts=True)
     gaps = np.diff(distinct)
-    if counts.min() >= 3:
+    rounding = 1e-6 * LEVEL_STEP
+    if counts.min() >= 3 and (gaps >= LEVEL_STEP - rounding).all():
         group = np.arange(distinct.size)
     else:
         group = np.concatenate([[0], np.cumsum(gaps > np.maximum(LEVEL_GAP, LEVEL_GAP_SHARE * distinct[1:]))])
@@ -41,8 +52,13 @@ def levels_of(pressure: FloatArray) -> FloatArray:
 
 
 def _rounded_level(median: float) -> float:
-    snapped = round(median / LEVEL_STEP) * LEVEL_STEP
-    return snapped if snapped > 0 and abs(median - snapped) <= 0.02e5 else round(median, 1)
+    """The roundest pressure that a gauge's error leaves [Pa], or the median itself."""
+    near = max(NAMED_WITHIN, NAMED_WITHIN_SHARE * median)
+    for step in LEVEL_NAMES:
+        snapped = round(median / step) * step
+        if snapped > 0 and abs(median - snapped) <= near:
+            return snapped
+    return round(median, 1)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

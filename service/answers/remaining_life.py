@@ -12,7 +12,6 @@ from sqlalchemy import Connection
 from service import repository
 from service.api.clutch import EndOfLifeIn
 from service.api.life import CriterionIn, CriterionOutcome, CriterionValue, LifePrediction, RemainingLife
-from service.api.run import Warned
 from service.clutch.assumptions import ALL_PRESSURES, MEAN_COF
 from service.clutch.condition import with_held_runs
 from service.clutch.items import ended, warned
@@ -59,10 +58,8 @@ def remaining_life(
         row = clutches.get(connection, clutch_id)
         if row is None:
             raise unknown_clutch(clutch_id)
-        stored, disagree = None, []
-        if pressure_bar is None:
-            stored = results.prediction_at(connection, clutch_id, method, ALL_PRESSURES, at_cycles)
-            disagree = _disagreement(connection, clutch_id, at_cycles)
+        carried = {} if pressure_bar is not None else _by_method(connection, clutch_id, at_cycles)
+        stored = carried.get(method)
         carried_on = pressure_bar is None and at_cycles is None
         now = at_cycles is None or at_cycles >= row.summary.get("as_of_cycles", math.inf)
         earlier = not now and bool(row.summary.get("held"))
@@ -75,24 +72,24 @@ def remaining_life(
             _with_held(database, state, method, pressure_bar, None if now else at_cycles) if count else None
         )
     if stored is not None:
-        prediction = repository.prediction(stored)
+        prediction = stored
     elif state is None:
         raise AssertionError("a prediction is stored, or the state was loaded")
     else:
         prediction = _predicted(state, method, pressure_bar, at_cycles)
-    prediction = prediction.model_copy(update={"warnings": [*prediction.warnings, *disagree]})
+    disagree = filters_disagree({**carried, method: prediction}) if carried else []
+    prediction = prediction.model_copy(update={"warnings": [*prediction.warnings, *warned(disagree)]})
     beside = with_held_runs(prediction.model_dump(), summary, outlook_with_held, count)
     head = {"clutch_id": clutch_id, "method": method, "revision": row.revision, "origin": row.record["origin"]}
     return RemainingLife(**{**head, **dict(prediction), **beside.of(prediction)}, criteria=_criteria(prediction))
 
 
-def _disagreement(connection: Connection, clutch_id: str, at_cycles: float | None) -> list[Warned]:
-    """The warning where the filters that are carried along a life disagree about the remaining life by mean COF."""
+def _by_method(connection: Connection, clutch_id: str, at_cycles: float | None) -> dict[str, LifePrediction]:
+    """The predictions of the remaining life by mean COF that are stored, of the filters that are carried along a life."""
     stored = {
         method: results.prediction_at(connection, clutch_id, method, ALL_PRESSURES, at_cycles) for method in CARRIED
     }
-    predictions = {method: repository.prediction(row) for method, row in stored.items() if row is not None}
-    return warned(filters_disagree(predictions))
+    return {method: repository.prediction(row) for method, row in stored.items() if row is not None}
 
 
 def _predicted(
@@ -182,7 +179,7 @@ def life_by_criteria(
         state = repository.state(connection, clutch_id)
         evidence = repository.evidence(connection, clutch_id)
         plain = quantity is None and life is None and pressure_bar is None
-        disagree = _disagreement(connection, clutch_id, at_cycles) if plain else []
+        disagree = warned(filters_disagree(_by_method(connection, clutch_id, at_cycles))) if plain else []
     by_criteria = partial(
         _by_criteria, method=method, quantity=quantity, criterion=criterion, pressure_bar=pressure_bar
     )

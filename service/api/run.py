@@ -252,7 +252,9 @@ class Fit(base.Answer):
     mse_percent: base.Real | None = Field(description="Eq. 5, %; null if the torque does not vary")
     rmse_nm: base.Real = Field(description="Root mean square of the residuals, Nm")
     noise_nm: base.Real = Field(description="Standard deviation of one point, Nm")
-    acceptable: bool = Field(description="Whether `mse_percent` is below 5")
+    acceptable: bool = Field(
+        description="Whether `mse_percent` is below 5, or the error is no more than the noise of the points"
+    )
     mean_cof: base.Real | None = Field(description="Mean COF of the curve; null if the data do not determine it")
     mean_cof_sd: base.Real | None = Field(description="Its standard deviation")
     points: int = Field(description="Number of points")

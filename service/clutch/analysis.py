@@ -11,17 +11,19 @@ import numpy as np
 
 from models.arrays import FloatArray
 from models.clutch import Geometry
+from models.friction.criteria import NO_STATIC_TORQUE
 from models.friction.identification import StribeckFit, StribeckFitStatus, fit_curves, mean_torques
+from models.friction.measured_curve import MeasuredCurve
 from models.friction.speed_protocol import protocol_speeds
 from models.loops.lag_fit import StationaryCurve
 from models.loops.loops import FrictionLoop, evaluate_loops
 from models.records.cleaning import missing_samples
 from models.records.criteria import UNLOADED
 from models.records.plateaus import cut_plateaus
-from models.records.runs import Plateaus, curves_by_pressure, loaded
+from models.records.runs import Curve, Plateaus, curves_by_pressure, loaded
 from models.records.torque_filter import filtered_as_torque
-from service.channels import PASCALS_PER_BAR
-from service.clutch.criteria import FEWEST_SPEEDS, POOR_FIT, WIDE_LEVEL
+from service.channels import PASCALS_PER_BAR, ZERO_CELSIUS
+from service.clutch.criteria import FEWEST_SPEEDS, OTHER_OIL, POOR_FIT, WIDE_LEVEL
 from service.clutch.engagements import Engagement, course_item, engagement_notices, evaluated
 from service.clutch.incoming_run import IncomingRun, SampledChannels, sampled_record, stationary_plateaus
 from service.errors import InvalidError, Notice
@@ -32,11 +34,25 @@ Value = tuple[float, float]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LevelFit:
-    """A pressure level's fit, the pressure measured there on average [Pa], and how many distinct speeds it saw."""
+    """A pressure level's fit, the pressure measured there on average [Pa], and how many distinct speeds it saw; its
+    `measured` points where the fit leaves the static torque open or at zero, for mean COF to be taken from."""
 
     fit: StribeckFit
     mean_pressure: float
     speeds: int
+    measured: MeasuredCurve | None = None
+
+    @classmethod
+    def of(cls, fit: StribeckFit, curve: Curve) -> "LevelFit":
+        """The level of a curve and its fit."""
+        none_at_rest = fit.parameters.static_torque <= NO_STATIC_TORQUE * math.sqrt(float((curve.torque**2).mean()))
+        open_at_rest = none_at_rest or "static_torque" in fit.undetermined
+        return cls(
+            fit=fit,
+            mean_pressure=curve.mean_pressure,
+            speeds=int(np.unique(curve.velocity).size),
+            measured=MeasuredCurve.of(curve.velocity, curve.torque, fit.noise) if open_at_rest else None,
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -104,10 +120,7 @@ def analyse(run: IncomingRun, geometry: Geometry, torque_filter: float) -> Analy
 def levels_of(plateaus: Plateaus, geometry: Geometry) -> tuple[LevelFit, ...]:
     """The curves of a stationary test fitted, pressures ascending."""
     curves = curves_by_pressure(plateaus, geometry)
-    return tuple(
-        LevelFit(fit=fit, mean_pressure=curve.mean_pressure, speeds=int(np.unique(curve.velocity).size))
-        for fit, curve in zip(fit_curves(curves), curves, strict=True)
-    )
+    return tuple(LevelFit.of(fit, curve) for fit, curve in zip(fit_curves(curves), curves, strict=True))
 
 
 def loops_of(
@@ -130,20 +143,18 @@ def _analyse_stationary(
     levels = levels_of(under_load, geometry)
     speed = np.abs(under_load.speed)
     low, high = float(speed.min()), float(speed.max())
-    has_mean = low < high and mean_cofs(levels, geometry.sliding_velocity(protocol_speeds(low, high)), geometry)
+    velocities = geometry.sliding_velocity(protocol_speeds(low, high)) if low < high else None
+    cofs = {} if velocities is None else mean_cofs(levels, velocities, geometry)
     warnings = [
+        *_oil_moves(under_load),
         *noticed,
         *(notice for level in levels for notice in _level_warnings(level, under_load)),
-        *(notice for level in levels for notice in _fit_warnings(level.fit)),
+        *(notice for level in levels for notice in _fit_warnings(level)),
     ]
-    if not has_mean:
-        message = (
-            f"without a mean COF this test does not count for the remaining life: test {FEWEST_SPEEDS} speeds or more"
-        )
-        warnings.append(Notice(code="no_mean_cof", message=message))
+    warnings.extend(_without_mean([level for level in levels if level.fit.pressure not in cofs], bool(cofs)))
     return Analysis(
         fits=levels,
-        speed_range=(low, high) if has_mean else None,
+        speed_range=(low, high) if cofs else None,
         oil_temperature=None if under_load.oil_temperature is None else float(under_load.oil_temperature.mean()),
         warnings=tuple(warnings),
         plateaus=plateaus,
@@ -157,19 +168,43 @@ def mean_cofs(
     geometry: Geometry,
     raised: Callable[[float], FloatArray] | None = None,
 ) -> dict[float, Value]:
-    """Mean COF over the protocol's velocities [m] m/s and its deviation by pressure [Pa], where a level determines it.
-    `raised` gives at a pressure [Pa] what friction is there of eq. 3 [m]."""
+    """Mean COF over the protocol's velocities [m] m/s and its deviation by pressure [Pa], where a level determines it: of
+    the fitted curve, or of the measured points where that has no static torque to go by. `raised` gives at a pressure [Pa]
+    what friction is there of eq. 3 [m]."""
     usable = [level for level in levels if level.speeds >= FEWEST_SPEEDS]
     if not usable:
         return {}
     per_cof = np.array([geometry.torque_per_cof(level.mean_pressure) for level in usable])
-    factor = 1.0 if raised is None else np.stack([raised(level.mean_pressure) for level in usable])
-    values = (mean_torques([level.fit for level in usable], velocities, factor) / per_cof[:, None]).tolist()
+    factor = np.ones((len(usable), velocities.size))
+    if raised is not None:
+        factor = np.stack([raised(level.mean_pressure) for level in usable])
+    torques = mean_torques([level.fit for level in usable], velocities, factor)
+    for place, level in enumerate(usable):
+        if level.measured is not None:
+            torques[place] = level.measured.mean(velocities, factor[place])
+    values = (torques / per_cof[:, None]).tolist()
     return {
         level.fit.pressure: (cof, sd)
         for level, (cof, sd) in zip(usable, values, strict=True)
         if math.isfinite(cof) and 0 < sd < cof
     }
+
+
+def _without_mean(levels: Sequence[LevelFit], others: bool) -> list[Notice]:
+    """That levels have no mean COF and why, whether the test counts by `others` or does not count."""
+    if not levels:
+        return []
+    few = all(level.speeds < FEWEST_SPEEDS for level in levels)
+    advice = (
+        f"test {FEWEST_SPEEDS} speeds or more"
+        if few
+        else "the mean torque there is not above zero by more than its uncertainty: check the torque's sign and its zero"
+    )
+    if not others:
+        message = f"without a mean COF this test does not count for the remaining life: {advice}"
+        return [Notice(code="no_mean_cof", message=message)]
+    at = ", ".join(f"{level.fit.pressure / PASCALS_PER_BAR:g}" for level in levels)
+    return [Notice(code="level_without_mean_cof", message=f"there is no mean COF at {at} bar: {advice}")]
 
 
 def _level_warnings(level: LevelFit, plateaus: Plateaus) -> list[Notice]:
@@ -185,6 +220,20 @@ def _level_warnings(level: LevelFit, plateaus: Plateaus) -> list[Notice]:
     return [Notice(code="wide_level", message=message)]
 
 
+def _oil_moves(plateaus: Plateaus) -> list[Notice]:
+    """Oil whose temperature changes within a test by more than two tests of a life may be apart."""
+    if plateaus.oil_temperature is None:
+        return []
+    low, high = np.quantile(plateaus.oil_temperature, [0.05, 0.95]).tolist()
+    if high - low <= OTHER_OIL:
+        return []
+    message = (
+        f"the oil went from {low - ZERO_CELSIUS:.0f} to {high - ZERO_CELSIUS:.0f} °C within this test, so its curves mix "
+        f"temperatures. First bring the oil to one temperature, within {OTHER_OIL:g} °C, and repeat the test"
+    )
+    return [Notice(code="oil_temperature_moves", message=message)]
+
+
 def _unloaded(plateaus: Plateaus, under_load: Plateaus | None) -> list[Notice]:
     below = f"below {UNLOADED / PASCALS_PER_BAR:g} bar"
     if under_load is None:
@@ -198,11 +247,13 @@ def _unloaded(plateaus: Plateaus, under_load: Plateaus | None) -> list[Notice]:
     return [Notice(code="unloaded_plateaus", message=message)] if left_out else []
 
 
-def _fit_warnings(fit: StribeckFit) -> list[Notice]:
+def _fit_warnings(level: LevelFit) -> list[Notice]:
+    fit, measured = level.fit, level.measured
     at = f"at {fit.pressure / PASCALS_PER_BAR:g} bar"
     if fit.status is StribeckFitStatus.UNDETERMINED:
         return [Notice(code="undetermined", message=f"{at}: {fit.message}")]
-    poor = fit.rmse > POOR_FIT * float(fit.parameters.static_torque)
+    scale = float(fit.parameters.static_torque) if measured is None else float(np.abs(measured.torque).max())
+    poor = fit.rmse > POOR_FIT * scale
     if not fit.acceptable and fit.mse_percent is not None and poor:
         message = f"{at}: the fit is poor: MSE {fit.mse_percent:.3g} % (limit: 5 %), RMSE {fit.rmse:.3g} Nm"
         return [Notice(code="poor_fit", message=message)]

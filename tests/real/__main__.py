@@ -65,7 +65,7 @@ def traction(http: httpx2.Client) -> None:
             left = said["remaining_cycles"][q]
             row[title] = "beyond" if left is None else f"{left:.3g}"
         rows.append(row)
-    show(f"{sum(fit['acceptable'] for fit in fits)} of {len(fits)} fits are acceptable (MSE below 5 %).", rows)
+    show(f"{sum(fit['acceptable'] for fit in fits)} of {len(fits)} fits are acceptable.", rows)
 
 
 def main() -> int:

@@ -97,6 +97,8 @@ def fit_row(pressure: float, **changed: Any) -> FitRow:
         mean_cof_sd=0.001,
         message="the Stribeck velocity lies at its bound",
         code_version="0.1.0",
+        acceptable=True,
+        measured=(0.5, 1.0, 20.0, 19.5, 1.0, 39.0),
     )
     return replace(row, **changed)
 
@@ -213,6 +215,8 @@ def take_back(connection: Connection) -> None:
     connection.exec_driver_sql("ALTER TABLE clutch DROP COLUMN IF EXISTS later")
     connection.exec_driver_sql("ALTER TABLE job DROP COLUMN IF EXISTS renewals")
     connection.exec_driver_sql("ALTER TABLE job ADD COLUMN IF NOT EXISTS leased_until TEXT")
+    for column in ("acceptable", "measured"):
+        connection.exec_driver_sql(f"ALTER TABLE fit DROP COLUMN IF EXISTS {column}")
     for table in metadata.tables:
         connection.exec_driver_sql(f"ALTER TABLE {table} DROP COLUMN IF EXISTS checksum")
     connection.execute(text("UPDATE alembic_version SET version_num = :before"), {"before": OLD})

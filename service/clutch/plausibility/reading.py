@@ -61,6 +61,10 @@ PRESSURE_SPAN, MIN_EXPONENT = 1.25, 0.4
 SINGLE_LEVEL_SPREAD = 0.1
 #: A mean COF below this is no friction where torque scatters about zero by half of itself and more.
 NO_FRICTION = 0.004
+#: Rows at exactly the highest torque, to this share of it, that are its sensor's limit [-], where so many of the other rows
+#: have a torque of their own [-]: else ties are counts. Chosen: of 280 rows in steps of 0.1 Nm half have one, of 0.01 Nm
+#: nine in ten.
+AT_THE_LIMIT, SAME_TORQUE, OWN_TORQUE = 4, 1e-6, 0.8
 #: Oil temperatures [K] that no sensor in oil shows: below what pours, above what K under the name of °C may be.
 COLDEST, HOTTEST = 273.15 - 60.0, 273.15 + 450.0
 
@@ -400,6 +404,27 @@ def _oddities(kind: str, columns: Columns, geometry: Geometry) -> Iterator[str]:
         yield f"torque is only noise ({noise}) under pressure: is the torque sensor connected?"
     elif kind in (STATIONARY, DYNAMIC):
         yield from _not_following(rows, geometry)
+    if kind == STATIONARY:
+        yield from _at_the_limit(rows)
+
+
+def _at_the_limit(rows: Columns) -> Iterator[str]:
+    """Torque that stays at its highest value at several speeds: no noise, no curve."""
+    size = np.abs(rows.torque)
+    highest = float(size.max())
+    at_limit = size >= (1.0 - SAME_TORQUE) * highest
+    others = size[~at_limit]
+    speeds = np.unique(np.abs(rows.speed[at_limit])).size
+    if speeds < AT_THE_LIMIT or np.unique(others).size < OWN_TORQUE * others.size or others.size < AT_THE_LIMIT:
+        return
+    low, high = (
+        f"{each / PASCALS_PER_BAR:.3g}" for each in (rows.pressure[at_limit].min(), rows.pressure[at_limit].max())
+    )
+    pressures = low if low == high else f"{low} to {high}"
+    yield (
+        f"torque is exactly {highest:.4g} Nm at {speeds} speeds at {pressures} bar, and never more: is that the limit of "
+        "its sensor or amplifier?"
+    )
 
 
 def _not_following(rows: Columns, geometry: Geometry) -> Iterator[str]:

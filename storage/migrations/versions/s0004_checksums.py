@@ -26,22 +26,27 @@ def upgrade() -> None:
     """Add the column, and fill it."""
     connection = op.get_bind()
     for name in _TABLES:
-        table = sa.Table(name, sa.MetaData(), autoload_with=connection)
         op.add_column(name, sa.Column("checksum", WHOLE, nullable=False, server_default=sa.text("0")))
-        keys = {f"key_{key.name}": key.name for key in table.primary_key}
-        filled = sa.table(name, sa.column("checksum"), *map(sa.column, keys.values()))
-        own = [filled.c[column] == sa.bindparam(key) for key, column in keys.items()]
-        fill = sa.update(filled).where(*own).values(checksum=sa.bindparam("sum"))
-        rows = connection.execute(sa.select(table), execution_options={"yield_per": _AT_ONCE}).mappings()
-        for part in rows.partitions():
-            sums = [{key: row[column] for key, column in keys.items()} | {"sum": _checksum(table, row)} for row in part]
-            connection.execute(fill, sums)
+        fill(connection, name)
+
+
+def fill(connection: sa.Connection, name: str) -> None:
+    """Write the checksum of every row of a table."""
+    table = sa.Table(name, sa.MetaData(), autoload_with=connection)
+    keys = {f"key_{key.name}": key.name for key in table.primary_key}
+    filled = sa.table(name, sa.column("checksum"), *map(sa.column, keys.values()))
+    own = [filled.c[column] == sa.bindparam(key) for key, column in keys.items()]
+    update = sa.update(filled).where(*own).values(checksum=sa.bindparam("sum"))
+    rows = connection.execute(sa.select(table), execution_options={"yield_per": _AT_ONCE}).mappings()
+    for part in rows.partitions():
+        sums = [{key: row[column] for key, column in keys.items()} | {"sum": _checksum(table, row)} for row in part]
+        connection.execute(update, sums)
 
 
 def _checksum(table: sa.Table, row: sa.RowMapping) -> int:
     keys = list(table.primary_key)
     given = keys[0].name if len(keys) == 1 and isinstance(keys[0].type, sa.Integer) else None
-    names = sorted(column.name for column in table.columns if column.name != given)
+    names = sorted(column.name for column in table.columns if column.name not in ("checksum", given))
     return zlib.crc32(b"\x1f".join(_bytes(table.c[name].type, row[name]) for name in names))
 
 

@@ -121,10 +121,19 @@ def test_a_level_is_as_wide_as_the_gap_or_its_share_of_the_pressure(pressure, wi
     [
         (NOMINAL + np.random.default_rng(1).normal(0.0, 0.02e5, NOMINAL.size), NOMINAL),
         ([5.00e5] * 3 + [5.05e5] * 3, [5.00e5] * 3 + [5.05e5] * 3),
+        ([4.99e5] * 4 + [5.00e5] * 5 + [5.01e5] * 3, [5e5] * 12),
+        ([9.97e5, 9.977e5, 9.985e5], [10e5] * 3),
         ([4.975e5, 4.976e5, 4.977e5], [4.976e5] * 3),
         ([5.01e5], [5e5]),
     ],
-    ids=["scattered about steps of 0.5 bar", "close but repeated", "far from a step", "one row"],
+    ids=[
+        "scattered about steps of 0.5 bar",
+        "close but repeated",
+        "counts of one sensor",
+        "a gauge's error at 10 bar",
+        "far from a step",
+        "one row",
+    ],
 )
 def test_pressures_find_their_level(pressure, levels):
     np.testing.assert_allclose(levels_of(np.asarray(pressure)), levels, rtol=1e-12)

@@ -1,7 +1,7 @@
 """What a list, a page and a terminal say of a clutch: its state with the reason, its safe bound, its held runs."""
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from itertools import permutations
 from pathlib import Path
 from types import SimpleNamespace
@@ -12,8 +12,10 @@ import pytest
 from fastapi.testclient import TestClient
 
 from models.diagnosis.experiments.candidates import TRIALS
+from models.prognosis.course_shares import CourseName, CourseProbability
 from models.prognosis.criteria import QUANTILES
 from service.answers import clutch_list, degradation, series
+from service.answers import remaining_life as answer_of_life
 from service.answers.remaining_life import remaining_life
 from service.api.clutch import AdvisedTest, LatestDiagnosis
 from service.api.life import LifePrediction
@@ -31,8 +33,9 @@ from service.clutch.condition import (
 )
 from service.clutch.criteria import MAX_LINE_POINTS
 from service.clutch.items import insufficient
-from service.clutch.notices import filters_disagree
+from service.clutch.notices import approximate, filters_disagree
 from service.clutch.timeline import Event
+from service.errors import Notice
 from service.paging import WHOLE
 from tests.service.changes.benches import CLUTCH, Bench, body, stood_in
 from tests.service.clients import as_answered
@@ -373,6 +376,35 @@ def test_a_median_outside_the_interval_of_another_filter_warns(other: tuple[floa
     notices = filters_disagree(answers | {"grid": predicted("insufficient_data", {})})
     assert [notice.code for notice in notices] == ["filters_disagree"] * warns
     assert all("8,000 (90 %: 5,000 to 12,000) by particle" in notice.message for notice in notices)
+
+
+def test_the_exact_filter_is_compared_with_those_that_are_carried(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for cycles in (0.0, 1000.0, 2000.0):
+        bench.send(body("test", f"t{cycles:g}", cycles))
+    compared: list[set[str]] = []
+
+    def record(answers: Mapping[str, LifePrediction]) -> list[Notice]:
+        compared.append(set(answers))
+        return []
+
+    monkeypatch.setattr(answer_of_life, "filters_disagree", record)
+    for method in METHODS:
+        remaining_life(bench.database, CLUTCH, method, None, None)
+    assert compared == [{"particle", "ukf"}, {"particle", "ukf"}, set(METHODS)]
+
+
+def test_the_unscented_filter_is_called_approximate_where_its_course_is_not_eq_6() -> None:
+    shares = {
+        name: CourseProbability(name=name, probability=probability, order=1.0)
+        for name, probability in ((CourseName.EQ_6, 0.4), (CourseName.SLOWING, 0.6))
+    }
+    slowing_first, eq_6_first = [shares[CourseName.SLOWING], shares[CourseName.EQ_6]], list(shares.values())
+    (notice,) = approximate("ukf", slowing_first)
+    assert notice.code == "approximate"
+    assert "slowing, 60 %" in notice.message.replace("60%", "60 %")
+    assert approximate("ukf", eq_6_first) == approximate("particle", slowing_first) == []
 
 
 # --- What a list shows of a clutch's latest past: the last run, mean COF as a short line, the newest verdict.

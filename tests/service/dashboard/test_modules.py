@@ -43,6 +43,7 @@ frame = module("charts/frame.js")
 bars = module("diagnosis/report.js")
 criteria = module("quantities/criteria.js")
 shown = module("shared/format.js")
+law = module("charts/stribeck_law.js")
 
 
 # --- Where a light chart has its axes, ticks and legend.
@@ -459,3 +460,18 @@ def test_numbers_are_shown_as_the_table_has_them(shown: Module) -> None:
     for name in ("fixed", "significant", "withSd", "cycles", "percent", "probability"):
         for nothing in ("null", "NaN", "Infinity", "-Infinity", "undefined"):
             assert shown.evaluate(f"m => m.{name}({nothing}, 1)") == "–", (name, nothing)
+
+
+# --- Curves beside each other.
+
+
+@pytest.mark.parametrize("static_torque", [20.0, 2e-5])
+def test_curves_are_shares_of_their_highest_whatever_the_static_torque(law: Module, static_torque: float) -> None:
+    """Of the static torque, a fit of friction that rises from zero went up to 1,000,000."""
+    parameters = {"coulomb_ratio": 12.0 / static_torque, "stribeck_velocity_m_s": 4.0, "viscous_coefficient": 0.5}
+    fit = {"pressure_bar": 5.0, "parameters": {"static_torque_nm": static_torque, **parameters}}
+    clutch = {"geometry": {"inner_diameter_mm": 99, "outer_diameter_mm": 133, "mean_radius_mm": None}}
+    curve = law("curveOf", fit, clutch, 0, 2000)
+    highest = law("highestOf", curve)
+    assert max(point["torque"] / highest for point in curve) == 1.0
+    assert 5.0 < highest < 25.0

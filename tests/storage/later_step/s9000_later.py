@@ -4,7 +4,7 @@ import sqlalchemy as sa
 from alembic import op
 
 revision = "s9000_later"
-down_revision: str | None = "s0005_leases_without_a_clock"
+down_revision: str | None = "s0006_fits_keep_their_points"
 
 
 def upgrade() -> None:

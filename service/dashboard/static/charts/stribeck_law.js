@@ -29,6 +29,12 @@ export function curveOf(fit, clutch, from, to, count = 80) {
 }
 
 /**
+ * The highest torque of a curve, Nm, of which others are shares: the static torque may be zero.
+ * @param {CurvePoint[]} points
+ */
+export const highestOf = (points) => Math.max(...points.map(({ torque }) => torque));
+
+/**
  * The measured points near a pressure; a long raw record is thinned evenly.
  * @param {Channels} channels
  * @param {number} pressure bar

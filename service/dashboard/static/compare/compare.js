@@ -7,7 +7,7 @@ import { Chart, choice } from "../charts/chart.js";
 import { column, CYCLES, KIND } from "../charts/columns.js";
 import { PARAMETER_NAMES } from "../charts/parameters.js";
 import { spread } from "../charts/stribeck.js";
-import { curveOf, xyOf } from "../charts/stribeck_law.js";
+import { curveOf, highestOf, xyOf } from "../charts/stribeck_law.js";
 import { planar, titled } from "../charts/traces.js";
 import { levelsOf, optionsOf, QUANTITIES, titleOf, usual } from "../quantities/names.js";
 import { clutchPath, read, readAll } from "../shared/api.js";
@@ -128,19 +128,20 @@ function curvesOf(lives, share) {
       const fit = all.find(({ pressure_bar: bar }) => bar === level);
       return fit ? [{ fit, cycles: cycles - (answer.life.from_cycles ?? 0) }] : [];
     });
-    const unit = share ? (fits[0]?.fit.parameters.static_torque_nm ?? 1) : 1;
-    return fits.map(({ fit, cycles }, state) => ({
+    const states = fits.map(({ fit, cycles }) => ({ fit, cycles, drawn: curveOf(fit, clutch, 0, 2000) }));
+    const unit = share && states.length > 0 ? highestOf(states[0].drawn) : 1;
+    return states.map(({ fit, cycles, drawn: points }, state) => ({
       name: `${label}, ${fixed(cycles)} cycles, ${pressureText(level)}`,
       index,
       state,
-      points: curveOf(fit, clutch, 0, 2000).map(({ speed, torque: nm }) => ({
+      points: points.map(({ speed, torque: nm }) => ({
         speed,
         torque: share ? nm / unit : torque.of(nm, fit.pressure_bar, clutch),
       })),
     }));
   });
   if (drawn.length === 0) return { empty: "None of the compared lives has a stationary test yet." };
-  const axis = share ? "torque, share of the static torque when new" : named(torque);
+  const axis = share ? "torque, share of the highest when new" : named(torque);
   return {
     note: "Fitted curves, one colour per life: solid for the first test, dashed for the middle one, dotted for the last.",
     columns: [{ name: "curve" }, column("speed, rpm"), column(axis, 4)],
