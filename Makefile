@@ -37,7 +37,7 @@
 #              in one process, in a pool and on a Dask cluster of which a worker is killed
 # make plausibility  sends mistyped and honest runs: the tables of docs/appendix/plausibility.md; STORE=FILE goes on where it
 #              ended                                    (SEED= CAMPAIGNS= HONEST= LIVES= ABLATED= ARGS=--write)
-# make real    what is said of real measurements; make benchmark: how long things take; make picture: README's pictures;
+# make real    what is said of real measurements; make benchmark: how long things take; make bench: as ratios to the least; make picture: README's pictures;
 #              make figures: the figures of docs/
 # make docs    the site of docs/, which the service serves at /help, with the pages on routes, fields, commands and codes made
 #              from the code; warnings and dead links are errors
@@ -69,7 +69,7 @@ SLIM := $(LOCK) $(foreach name,$(UNUSED),--no-emit-package $(name))
 # what the first run of the tests compiles, the next ones read: a third of what `make quick` takes
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: files help compiled docs gallery reference adoption law_adoption demo shell test quick slow faults check check-python check-javascript lowest benchmark load scale real figures architecture blind law oracle visible mutants plausibility score rivals picture lock clean
+.PHONY: files help compiled docs gallery reference adoption law_adoption demo shell test quick slow faults check check-python check-javascript lowest bench benchmark load scale real figures architecture blind law oracle visible mutants plausibility score rivals picture lock clean
 .DELETE_ON_ERROR:
 
 # the demo's pages link to /help: where it cannot be built, as without the internet, its page says so
@@ -135,6 +135,9 @@ benchmark: $(VENV)/.tests
 files: $(VENV)/.tests
 	$(BIN)/python -W ignore -m tests.lab.files $(ARGS)
 
+bench: $(VENV)/.tests
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.benchmarks.ratios $(ARGS)
+
 load: $(VENV)/.tests
 	$(BIN)/python -m tests.load $(ARGS)
 
@@ -192,6 +195,7 @@ score: $(VENV)/.tests
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.score $(ARGS)
 
 rivals: $(VENV)-rivals/.ready
+	OPENBLAS_NUM_THREADS=1 $(VENV)-rivals/bin/python -m tests.rivals.laws $(ARGS)
 	OPENBLAS_NUM_THREADS=1 $(VENV)-rivals/bin/python -m tests.rivals $(ARGS)
 
 $(VENV)-rivals/.ready: pyproject.toml | $(VENV)/.python

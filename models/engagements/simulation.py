@@ -18,7 +18,6 @@ from dataclasses import dataclass
 from typing import Protocol, TypeAlias
 
 import numpy as np
-from scipy.integrate import solve_ivp
 
 from models.arrays import FloatArray
 from models.friction.criteria import FEWEST_PRESSURES
@@ -142,6 +141,8 @@ def engage(
     rate: float = 200.0,
 ) -> Engagement:
     """Close the clutch on the turning shaft; `longest` [s] bounds the simulation, `rate` [Hz] is the trace's."""
+    from scipy.integrate import solve_ivp  # start-up time: of all answers only a simulated engagement needs it
+
     profile = PressureProfile() if profile is None else profile
     drive = Drive() if drive is None else drive
     if longest <= profile.contact:

@@ -28,7 +28,6 @@ from enum import StrEnum
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize_scalar
 
 from models.arrays import FloatArray
 from models.engagements import criteria
@@ -215,6 +214,8 @@ class _Rest:
 
 
 def _rest_of(power: int, time: FloatArray, speed: FloatArray, earliest: float, latest: float) -> _Rest:
+    from scipy.optimize import minimize_scalar  # start-up time: only a raw record of an engagement has an end of slip
+
     span = latest - earliest
 
     def design(end: float) -> FloatArray:

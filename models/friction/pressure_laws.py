@@ -14,7 +14,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import minimize_scalar, nnls
 
 from models.arrays import FloatArray
 from models.friction.criteria import FEWEST_PRESSURES
@@ -146,6 +145,8 @@ def fit_asymptotic(pressure: FloatArray, value: FloatArray, deviation: FloatArra
 
     p_0 is scanned from 0.05 to 20 times the pressures' range, then refined between the best one's neighbours.
     """
+    from scipy.optimize import minimize_scalar, nnls  # start-up time: only charts over pressure need it
+
     least = float(pressure.min())
     span = max(float(np.ptp(pressure)), 1e-6 * least)
 

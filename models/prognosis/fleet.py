@@ -23,7 +23,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 from scipy.special import gammaln, log_expit
 
 from models.arrays import FloatArray
@@ -235,6 +234,8 @@ def _log_evidence_ratio(
 
     `lean` is log(prior 2/prior 1) at the draws. Bennett: E1[σ(lean - c)] = E2[σ(c - lean)] at c = log(Z2/Z1).
     """
+    from scipy.optimize import brentq  # start-up time: only a fleet that is learned compares priors
+
     both = np.concatenate([lean_first, lean_second])
     low, high = float(both.min()) - 1.0, float(both.max()) + 1.0
 

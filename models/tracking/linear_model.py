@@ -150,8 +150,9 @@ def pointwise(
     np.exp(2.0 * points.log_scatter, out=scatter[1])
     np.multiply(scatter[1], FORM_PROPORTIONAL[points.form], out=scatter[2])
     scatter[1] -= scatter[2]
-    d = np.multiply(points.outlying, (prior.outlying_size * prior.size) ** 2, out=np.empty(b.shape))
-    d += np.array([history.variance, np.ones(b.shape[0]), prior.relative_squared(history.value)]).T @ scatter
+    d = np.array([history.variance, np.ones(b.shape[0]), prior.relative_squared(history.value)]).T @ scatter
+    flagged, test = np.divmod(np.flatnonzero(points.outlying.T), b.shape[0])
+    d[test, flagged] += points.outlying[test, flagged] * (prior.outlying_size * prior.size) ** 2
     y = history.value - prior.initial_mean
     if isinstance(history, MergedHistory):
         log_r = -history.count @ np.log(d) - history.count.sum() * math.log(2.0 * math.pi)

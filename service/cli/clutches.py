@@ -7,7 +7,6 @@ from datetime import datetime
 from pathlib import Path
 from typing import Annotated, Any
 
-import httpx2
 import typer
 
 from service.cli import options
@@ -91,7 +90,7 @@ def status(
     try:
         with Client(url, key, patience=patience) as client:
             item = client.clutch(clutch)
-    except (ClutchlifeError, httpx2.InvalidURL, ValueError, OSError) as error:
+    except (ClutchlifeError, ValueError, OSError) as error:
         options.say(f"clutchlife: the state is unknown: {error}")
         raise typer.Exit(UNKNOWN) from None
     if as_json:

@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing, contextmanager
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
-import httpx2
 import typer
 from rich.console import Console, ConsoleOptions, RenderableType
 from rich.markup import escape
@@ -100,8 +99,6 @@ def errors_in_a_line() -> Iterator[None]:
         fail(str(error), EX_DATAERR)
     except (StorageError, NotFoundError, FileExistsError) as error:
         fail(str(error))
-    except httpx2.InvalidURL as error:
-        fail(f"the address is not valid: {error}", EX_USAGE)
     except OSError as error:
         fail(f"{error.filename}: {error.strerror}" if error.filename and error.strerror else str(error), EX_USAGE)
     except ValueError as error:

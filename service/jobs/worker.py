@@ -14,7 +14,7 @@ from multiprocessing.connection import Connection
 from typing import Any
 
 from service import logging
-from service.jobs.background import end_with_parent, use_one_blas_thread, yield_to_others
+from service.jobs.background import end_with_parent, keep_memory, use_one_blas_thread, yield_to_others
 from storage.engine.database import Database
 from storage.engine.opening import open_database
 
@@ -49,6 +49,7 @@ def begin(database_url: str, nice: int | None, log: tuple[logging.LogFormat, log
     else:
         os.nice(nice)
     use_one_blas_thread()
+    keep_memory()
     for name in LOADED_EARLY:
         importlib.import_module(name)
     gc.freeze()  # what is loaded stays: the collector need not walk through it

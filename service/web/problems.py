@@ -164,6 +164,8 @@ def unexpected(request: Request, error: Exception) -> Response:
     return refused(ServiceError, "the service's log describes this error")
 
 
+#: The schema of all problems, made once: sixty answers of routes refer to it.
+_PROBLEM = Problem.model_json_schema()
 #: The answers of a route by their status, as FastAPI takes them for the API's description.
 Described: TypeAlias = dict[int | str, dict[str, Any]]
 
@@ -177,7 +179,7 @@ def described(*kinds: type[ServiceError]) -> Described:
 
 
 def _described(title: str) -> dict[str, object]:
-    return {"description": title, "content": {PROBLEM_TYPE: {"schema": Problem.model_json_schema()}}}
+    return {"description": title, "content": {PROBLEM_TYPE: {"schema": _PROBLEM}}}
 
 
 READING = described(NotFoundError)

@@ -2,8 +2,6 @@
 table with the source's name in its one row.
 """
 
-from alembic.autogenerate import compare_metadata
-from alembic.migration import MigrationContext
 from sqlalchemy import Column, Connection, MetaData, Table, inspect, select
 
 from storage.dialects import TEXT
@@ -25,6 +23,9 @@ def refuse_newer(revision: str | None) -> None:
 
 def other_schema(connection: Connection) -> list[str]:
     """How the schema differs from this code's; empty where it does not. Raises DatabaseTooOld on an earlier revision's."""
+    from alembic.autogenerate import compare_metadata  # start-up time: only `verify` compares schemas
+    from alembic.migration import MigrationContext  # start-up time
+
     if current(connection) != head():
         raise DatabaseTooOld(
             f"the database is at revision {current(connection)}: its runs can be checked only at {head()}. "

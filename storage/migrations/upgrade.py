@@ -3,17 +3,16 @@
 A step is named, and applied and recorded in the caller's transaction.
 
 A new step is a file in `versions/` whose `revision` is its own name and whose `down_revision` is the step before.
+Names begin with a number that increases: they alone say which revision is the newest, and Alembic is loaded only to migrate.
 Steps only go forward: going back is restoring a backup.
 """
 
+import os
 import threading
 from functools import cache
 from pathlib import Path
 
-from alembic import command
-from alembic.config import Config
-from alembic.migration import MigrationContext
-from alembic.script import ScriptDirectory
+import sqlalchemy as sa
 from sqlalchemy import Connection
 
 from storage.tables import metadata
@@ -22,32 +21,31 @@ from storage.tables import metadata
 _one_at_a_time = threading.Lock()
 
 
-def _config() -> Config:
-    config = Config()
-    # A % in a path would be read as interpolation.
-    config.set_main_option("script_location", str(Path(__file__).parent).replace("%", "%%"))
-    config.set_main_option("path_separator", "os")
-    return config
+#: Where the steps are.
+FOLDERS: tuple[Path, ...] = (Path(__file__).parent / "versions",)
+#: Where Alembic records the revision.
+_recorded = sa.table("alembic_version", sa.column("version_num", sa.String))
 
 
 @cache
 def head() -> str:
-    """The revision that this code needs."""
-    revision = ScriptDirectory.from_config(_config()).get_current_head()
-    if revision is None:
+    """The revision that this code needs. Raises RuntimeError where the installation lacks the migrations."""
+    if not revisions():
         raise RuntimeError("the migrations are missing from this installation")
-    return revision
+    return max(revisions())
 
 
 @cache
 def revisions() -> frozenset[str]:
     """All revisions that this code can bring to the head."""
-    return frozenset(step.revision for step in ScriptDirectory.from_config(_config()).walk_revisions())
+    return frozenset(step.stem for folder in FOLDERS for step in folder.glob("s*.py"))
 
 
 def current(connection: Connection) -> str | None:
     """The revision that the database is at; None where it is empty."""
-    return MigrationContext.configure(connection).get_current_revision()
+    if not sa.inspect(connection).has_table(_recorded.name):
+        return None
+    return connection.scalar(sa.select(_recorded.c.version_num))
 
 
 def upgrade(connection: Connection) -> None:
@@ -55,8 +53,15 @@ def upgrade(connection: Connection) -> None:
 
     The transaction must have been begun as a writing one.
     """
+    from alembic import command  # start-up time: a database at the head needs no step
+    from alembic.config import Config  # start-up time
+
     with _one_at_a_time:
-        config = _config()
+        config = Config()
+        # A % in a path would be read as interpolation.
+        config.set_main_option("script_location", str(Path(__file__).parent).replace("%", "%%"))
+        config.set_main_option("version_locations", os.pathsep.join(map(str, FOLDERS)).replace("%", "%%"))
+        config.set_main_option("path_separator", "os")
         config.attributes["connection"] = connection
         if current(connection) is None:
             metadata.create_all(connection, checkfirst=False)

@@ -1,4 +1,5 @@
-"""`make rivals`: the same lives predicted by other packages, in one run: CRPS and time beside ours.
+"""`make rivals`: the same lives predicted by other packages of prognosis, in one run: CRPS and time beside ours. What numpy
+and scipy give without them is in `laws`.
 
 SIZE= scales the number of lives    SEED= other lives (2026)    ARGS=--write puts the table into docs/appendix/prognosis.md
 """
@@ -19,14 +20,15 @@ from models.tracking.filters.ukf import Ukf
 from models.tracking.prior import weak
 from tests.measuring import Asked, publish, table
 from tests.models.prognosis.sample_scores import crps_of_sample
-from tests.rivals.others import CAP, DRAWS, PlainUkf, Progpy, Sample, Surpyval, fitted
-from tests.statistical.lives import STAGES, ends, typical
+from tests.rivals.others import Progpy, Surpyval
+from tests.rivals.plain import DRAWS, Sample
+from tests.statistical.lives import CAP, STAGES, ends, typical
 
 #: Inspections in a life, and the scatter of each as a share of COF when new.
 INSPECTIONS, SCATTER = 60, 0.01
 #: Of so many lives progpy simulates its own distribution, for the time that it takes.
 SIMULATED = 1
-PACKAGES = ("numpy", "filterpy", "progpy", "surpyval", "scipy")
+PACKAGES = ("numpy", "progpy", "surpyval", "scipy")
 
 
 class Tally:
@@ -96,9 +98,8 @@ def compared(count: int, seed: int) -> tuple[Tally, int]:
             f"`{tracker.name}`": (tracker, tracker.start(prior)) for tracker in (Grid(), Particle(), Ukf())
         }
         theirs = {
-            "filterpy `UnscentedKalmanFilter`": PlainUkf(prior, life.scatter),
-            "progpy `UnscentedKalmanFilter`": Progpy("UnscentedKalmanFilter", prior, life.scatter, gap),
-            "progpy `ParticleFilter`": Progpy("ParticleFilter", prior, life.scatter, gap),
+            "progpy `UnscentedKalmanFilter`": Progpy("UnscentedKalmanFilter", prior, life.scatter, gap, rng),
+            "progpy `ParticleFilter`": Progpy("ParticleFilter", prior, life.scatter, gap, rng),
         }
         unit = Surpyval(prior, life.scatter)
         for index, measurement in enumerate(measurements):
@@ -118,7 +119,6 @@ def compared(count: int, seed: int) -> tuple[Tally, int]:
                     tally.whole[f"{name} and `MonteCarlo`, its own simulation"].append(time.process_time() - begun)
             seen = measurements[: index + 1]
             tally.scored("surpyval `predict_rul`", partial(unit.sample, seen, rng), life.end)
-            tally.scored("scipy `curve_fit`, delta method", partial(fitted, seen, prior, rng), life.end)
     return tally, len(lives)
 
 

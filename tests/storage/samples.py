@@ -1,6 +1,5 @@
 """Rows to store, each recognisable by its number."""
 
-import os
 import sqlite3
 import subprocess
 import sys
@@ -13,7 +12,6 @@ from tempfile import TemporaryDirectory
 from typing import IO, Any
 
 import numpy as np
-from alembic.config import Config
 from numpy.typing import NDArray
 from sqlalchemy import Connection, text, true
 
@@ -157,20 +155,14 @@ _LATER = Path(__file__).parent / "later_step"
 @contextmanager
 def later_step() -> Iterator[None]:
     """The code of a later release, with one step more, inside."""
-    plain, versions = migrations._config, Path(migrations.__file__).parent / "versions"
-
-    def with_later_step() -> Config:
-        config = plain()
-        config.set_main_option("version_locations", f"{versions}{os.pathsep}{_LATER}")
-        return config
-
-    migrations._config = with_later_step
+    plain = migrations.FOLDERS
+    migrations.FOLDERS = (*plain, _LATER)
     try:
         for known in (migrations.head, migrations.revisions):
             known.cache_clear()
         yield
     finally:
-        migrations._config = plain
+        migrations.FOLDERS = plain
         for known in (migrations.head, migrations.revisions):
             known.cache_clear()
 

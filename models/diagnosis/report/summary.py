@@ -185,7 +185,9 @@ def _law(report: Report) -> list[Sentence]:
         )
     if law is not None and law.adoptable and law.gain is not None:
         better = number(float(f"{law.gain.reduction_percent:.2g}"))
-        sentences.append(Sentence(f"You can adopt the curve as found: it predicts other runs {better} % better.", RATHER))
+        sentences.append(
+            Sentence(f"You can adopt the curve as found: it predicts other runs {better} % better.", RATHER)
+        )
     if report.like_the_law:
         names = listed([_cause_name(slug) for slug in report.like_the_law], "or")
         tests = list(dict.fromkeys(_TELLS[slug] for slug in report.like_the_law if slug in _TELLS))

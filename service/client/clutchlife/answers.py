@@ -14,11 +14,12 @@
 from collections.abc import Mapping
 from datetime import UTC, datetime
 from email.utils import parsedate_to_datetime
-from typing import Any
-
-import httpx2
+from typing import TYPE_CHECKING, Any
 
 from .notebook import as_html
+
+if TYPE_CHECKING:
+    import httpx2
 
 #: Statuses below 500 that pass by themselves: a slow request, one that came too early, too many of them.
 _TRANSIENT = (408, 425, 429)
@@ -108,7 +109,7 @@ def suggested(suggestion: dict[str, Any]) -> str:
     return f"suggested ({suggestion['confidence']:.0%}): {', '.join(parts)}; first row: {first}"
 
 
-def passing(response: httpx2.Response, answer: object | None) -> str | None:
+def passing(response: "httpx2.Response", answer: object | None) -> str | None:
     """Why the answer, with what was read in it, is none of the service's or means "not now"; None where it is final."""
     status = response.status_code
     if status < 300:
@@ -124,7 +125,7 @@ def passing(response: httpx2.Response, answer: object | None) -> str | None:
     return None
 
 
-def perhaps_stored(response: httpx2.Response) -> bool:
+def perhaps_stored(response: "httpx2.Response") -> bool:
     """Whether the service may have carried out a request that got this passing answer."""
     return response.status_code not in _STORED_NOTHING
 
@@ -136,7 +137,7 @@ class ServiceAnswer(dict[str, Any]):
         return as_html(self)
 
 
-def content(response: httpx2.Response) -> ServiceAnswer | None:
+def content(response: "httpx2.Response") -> ServiceAnswer | None:
     """The JSON object of an answer; None where it holds none."""
     try:
         answer = response.json()
@@ -145,18 +146,18 @@ def content(response: httpx2.Response) -> ServiceAnswer | None:
     return ServiceAnswer(answer) if isinstance(answer, dict) else None
 
 
-def csv(response: httpx2.Response) -> str | None:
+def csv(response: "httpx2.Response") -> str | None:
     """The rows of an answer that is a table; None where it is none."""
     return response.text if response.headers.get("Content-Type", "").startswith("text/csv") else None
 
 
-def image(response: httpx2.Response) -> bytes | None:
+def image(response: "httpx2.Response") -> bytes | None:
     """The file of an answer that is a photograph or a run's file; None where it is none."""
     media = response.headers.get("Content-Type", "")
     return response.content if media.startswith(("image/", "application/octet-stream")) else None
 
 
-def problem(response: httpx2.Response) -> dict[str, Any]:
+def problem(response: "httpx2.Response") -> dict[str, Any]:
     """The problem report of a refusal, or its text as one."""
     report = content(response)
     return {"detail": response.text[:_MAX_QUOTED]} if report is None else report

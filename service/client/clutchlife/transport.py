@@ -5,11 +5,12 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
-
-import httpx2
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from .answers import RefusedError, ServiceAwayError, content, csv, image, passing, perhaps_stored, problem, retry_after
+
+if TYPE_CHECKING:
+    import httpx2
 
 #: What is read of a response.
 Answer = TypeVar("Answer")
@@ -17,15 +18,15 @@ Answer = TypeVar("Answer")
 JSON = {"Content-Type": "application/json"}
 #: Seconds between tries: doubled from the first to the last.
 FIRST_WAIT, LAST_WAIT = 0.25, 15.0
-#: Failures before a byte of the request has left.
-_NOT_SENT = (httpx2.ConnectError, httpx2.ConnectTimeout, httpx2.PoolTimeout)
 
 
-def _failure(error: httpx2.RequestError) -> str:
-    """A failed request in words, without the library's names."""
-    if isinstance(error, _NOT_SENT):
-        return "no connection"
-    return "no answer in time" if isinstance(error, httpx2.TimeoutException) else "the connection broke off"
+def _failure(error: "httpx2.RequestError") -> tuple[str, bool]:
+    """A failed request in words, without the library's names, and whether a byte of the request may have left."""
+    import httpx2  # start-up time
+
+    if isinstance(error, httpx2.ConnectError | httpx2.ConnectTimeout | httpx2.PoolTimeout):
+        return "no connection", False
+    return "no answer in time" if isinstance(error, httpx2.TimeoutException) else "the connection broke off", True
 
 
 class NoLongerWantedError(Exception):
@@ -36,7 +37,7 @@ class NoLongerWantedError(Exception):
 class Service:
     """A running service. `patience` [s] is how long one request is tried again while the service is away or busy."""
 
-    http: httpx2.Client
+    http: "httpx2.Client"
     patience: float = 60.0
     on_wait: Callable[[str, float], None] = lambda _reason, _seconds: None
 
@@ -108,12 +109,14 @@ class Service:
         self,
         method: str,
         path: str,
-        read: Callable[[httpx2.Response], Answer | None],
+        read: Callable[["httpx2.Response"], Answer | None],
         *,
         file: Path | None = None,
         wanted: Callable[[], bool] = lambda: True,
         **request: Any,
     ) -> Answer:
+        import httpx2  # start-up time
+
         deadline, wait, unsure = time.monotonic() + self.patience, FIRST_WAIT, False
         report: dict[str, Any] | None = None
         while True:
@@ -125,8 +128,9 @@ class Service:
                 detail = f"the address {str(self.http.base_url).rstrip('/')} is not valid: {error}"
                 raise RefusedError(0, {"detail": detail}) from error
             except httpx2.RequestError as error:
-                reason = f"{_failure(error)}; is the service running at this address?"
-                unsure = unsure or not isinstance(error, _NOT_SENT)
+                failure, sent = _failure(error)
+                reason = f"{failure}; is the service running at this address?"
+                unsure = unsure or sent
             else:
                 answer = read(response)
                 reason = passing(response, answer) or ""
@@ -142,7 +146,7 @@ class Service:
             time.sleep(wait)
             wait = min(2 * wait, LAST_WAIT)
 
-    def _try(self, method: str, path: str, file: Path | None, request: dict[str, Any]) -> httpx2.Response:
+    def _try(self, method: str, path: str, file: Path | None, request: dict[str, Any]) -> "httpx2.Response":
         if file is None:
             return self.http.request(method, path, **request)
         with file.open("rb") as opened:
@@ -163,7 +167,12 @@ def _plain(value: Any) -> Any:
     raise TypeError(f"{type(value).__name__} cannot be sent as JSON")
 
 
-def connect(url: str, *, key: str | None = None, timeout: float = 60.0) -> httpx2.Client:
-    """A client for the service at `url`, with a key where one is needed."""
+def connect(url: str, *, key: str | None = None, timeout: float = 60.0) -> "httpx2.Client":
+    """A client for the service at `url`, with a key where one is needed. Raises ValueError on an address that is none."""
+    import httpx2  # start-up time: a tenth of a second, which no command needs that asks no service
+
     headers = {} if key is None else {"Authorization": f"Bearer {key}"}
-    return httpx2.Client(base_url=url, headers=headers, timeout=timeout)
+    try:
+        return httpx2.Client(base_url=url, headers=headers, timeout=timeout)
+    except httpx2.InvalidURL as error:
+        raise ValueError(f"the address is not valid: {error}") from error

@@ -1,6 +1,7 @@
 """Work in the background yields, and what is loaded and stored for it does not."""
 
 import os
+import platform
 import signal
 import subprocess
 import sys
@@ -125,3 +126,29 @@ def test_an_interrupt_ends_a_command_in_the_middle_and_leaves_nothing_half_done(
     assert "Traceback" not in said
     with closing(open_database(url, lock_timeout=0.05)) as database, database.writing() as connection:
         assert clutches.all_ids(connection) == []
+
+
+_REUSING = """
+import resource, sys
+import numpy as np
+from service.jobs.background import keep_memory
+if sys.argv[1] == "kept":
+    keep_memory()
+def faults():
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
+    for _ in range(20):
+        several = [np.ones((100, 4000)) for _ in range(3)]
+        del several
+    return resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before
+faults()
+print(faults())
+"""
+
+
+@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="other C libraries keep memory by their own rules")
+def test_memory_of_arrays_is_kept_for_the_next_ones() -> None:
+    def faults(how: str) -> int:
+        command = [sys.executable, "-c", _REUSING, how]
+        return int(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
+
+    assert faults("kept") < 100 < 10_000 < faults("given back")

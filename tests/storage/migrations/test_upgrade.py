@@ -126,11 +126,12 @@ def test_a_file_of_the_last_step_is_as_it_is(tmp_path: Path) -> None:
 
 
 def test_steps_are_one_line_and_named_after_their_files() -> None:
-    steps = list(ScriptDirectory.from_config(migrations._config()).walk_revisions())
+    scripts = ScriptDirectory(Path(migrations.__file__).parent)
+    steps = list(scripts.walk_revisions())
     assert [Path(step.path).stem for step in steps] == [step.revision for step in steps]
     assert all(step.doc and len(step.revision) <= 32 for step in steps)
-    files = Path(migrations.__file__).parent.glob("versions/s*.py")
-    assert {path.stem for path in files} == {step.revision for step in steps}
+    assert migrations.revisions() == {step.revision for step in steps}
+    assert migrations.head() == scripts.get_current_head()
 
 
 def test_a_newer_database_is_refused_and_left_alone(database: Database) -> None:
