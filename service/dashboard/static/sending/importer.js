@@ -122,7 +122,11 @@ export function importer(file, number, run, together) {
     const sure = `${Math.round(100 * Number(suggestion.confidence))} %`;
     return h(
       "div.notice",
-      h("p", h("b", "Suggested, not certain. "), `Confidence ${sure}. It is not read without a question: ${suggestion.why}.`),
+      h(
+        "p",
+        h("b", "Suggested, not certain. "),
+        `Confidence ${sure}. It is not read without a question: ${suggestion.why}.`,
+      ),
       h("label", box, " The channels, units and rows below are right, for these files"),
       saving(shown),
     );
