@@ -250,6 +250,9 @@ def understood(columns: Sequence[FileColumn], reading: Reading) -> tuple[list[Ta
         # neither a mean beside the signal itself nor what stands in a group of set points
         plain = [at for at in whole if not (MEANS & {*words(columns[at].name)} or is_another(columns[at].group))]
         candidates = plain or whole
+        if channel != "time_s" and len(candidates) == 1 and key(columns[candidates[0]].name) != channel:
+            # one more of the same quantity, but for a word that is not known: `Torque corrected` beside `Torque`
+            candidates += [at for at in free if senses[at] == (channel, Sense.PART)]
         if channel == "time_s" or len(candidates) == 1:
             chosen |= dict.fromkeys(candidates, channel)
         elif candidates:

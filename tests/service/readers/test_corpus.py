@@ -901,10 +901,14 @@ def test_no_file_is_accepted_with_a_channel_off_by_a_factor(
     mapping = ",".join(f"{channel}:{title}" for channel, title in zip(TITLES, titles, strict=True)) if mapped else None
     text = "\n".join([separator.join(titles), *lines]) + "\n"
     try:
-        columns = read_content(tmp_path_factory.getbasetemp(), text, mapping).columns
+        found = read_content(tmp_path_factory.getbasetemp(), text, mapping)
     except InvalidError:
         return
+    columns = found.columns
     for place, channel in enumerate(TITLES):
+        if channel not in columns:  # a clock that stands still and whose unit is a letter
+            assert any(titles[place] in notice.message for notice in found.notices), channel
+            continue
         stated = UNITS[CHANNELS[channel].unit][units[channel]]
         expected = [stated.factor * float(row[place]) + stated.offset for row in printed]
         np.testing.assert_allclose(columns[channel], expected, rtol=1e-9, atol=1e-9, err_msg=channel)

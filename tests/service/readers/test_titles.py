@@ -1,5 +1,7 @@
 """Column titles, synonyms, units and maps -> channels, and titles that are refused."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -8,6 +10,7 @@ from service.readers.column_names import choose, column_of, known_channel, parse
 from service.readers.read_file import reading_of
 from service.readers.table import ColumnChoice, FileColumn, Reading
 from service.readers.unit_table import conversion
+from tests.service.readers.sample_files import read_content
 
 
 @pytest.mark.parametrize(
@@ -95,3 +98,25 @@ def test_a_multiple_of_a_unit_is_that_many_and_a_unit_of_something_else_is_not_k
 ) -> None:
     converted = conversion(channel, unit)
     assert (converted and converted.factor) == (factor and pytest.approx(factor))
+
+
+@pytest.mark.parametrize(
+    ("titles", "asked"),
+    [
+        ("Pressure [bar],Speed [rpm],Torque [Nm],Torque corrected [Nm]", "torque_nm"),
+        ("Druck [bar],Druck korrigiert [bar],Drehzahl [1/min],M [Nm]", "pressure_bar"),
+        ("Pressure [bar],Speed [rpm],Torque [Nm],Slip [rpm]", "speed_rpm"),
+        ("Pressure [bar],n [rpm],Torque [Nm],delta n [rpm]", "speed_rpm"),
+        ("Pressure [bar],Speed [rpm],Torque [Nm],Slip [%]", None),
+        ("Pressure [bar],Speed [rpm],torque_nm,Torque corrected [Nm]", None),
+    ],
+)
+def test_a_second_column_of_a_quantity_is_asked_about(tmp_path: Path, titles: str, asked: str | None) -> None:
+    """A raw torque was taken beside a corrected one, and a motor's speed beside the slip."""
+    rows = [f"2,{20 * k},{8 + 0.1 * k},{6 + 0.2 * k}" for k in range(1, 9)]
+    text = "\n".join([titles, *rows]) + "\n"
+    if asked is None:
+        assert {"pressure_bar", "speed_rpm", "torque_nm"} <= read_content(tmp_path, text).columns.keys()
+        return
+    with pytest.raises(InvalidError, match=f"{asked} must be one column"):
+        read_content(tmp_path, text)
