@@ -38,7 +38,15 @@ AT = "2026-11-02T10:00:00+00:00"
 WHO = {"by": "local", "at": AT}
 PRESSURES, OTHER_PRESSURES, SPEEDS = (4.0, 6.0), (5.0, 7.0), tuple(range(20, 1971, 150))
 REPORT = {"verdict": "cause_named", "causes": []}
-EXTENSION = Extension(effects=("torque_zero_shift",), content={"shift_nm": 0.5, "course_nm": -0.2}).to_dict()
+EXTENSION = Extension(
+    effects=("torque_zero_shift",),
+    content={
+        "shift_nm": 0.5,
+        "course_nm": -0.2,
+        "law": None,
+        "draws": [{"weight": 1.0, "effects": [{"slug": "torque_zero_shift", "amplitude": 0.5}]}],
+    },
+).to_dict()
 #: What only the audit knows of a run.
 OF_THE_AUDIT = ("state", "doubts", "sent_cycles", "content_sha256")
 #: The second of the start of a run that is doubted.
