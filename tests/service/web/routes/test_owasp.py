@@ -55,7 +55,8 @@ _CLIENTS = re.compile(
 
 def test_api7_the_service_asks_no_address_that_it_is_sent_but_receivers_of_alarms() -> None:
     """No other part of it than the command line and the client can open a connection; its readers, whose warm process is
-    spoken to through a pair of sockets, cannot even by force: test_sandbox.py. Which addresses receivers may have: tests/service/alarms/test_receivers.py."""
+    spoken to through a pair of sockets, cannot even by force: test_sandbox.py. Which addresses receivers may have:
+    tests/service/alarms/test_receivers.py."""
     sources = [path.relative_to(ROOT / "service") for path in (ROOT / "service").rglob("*.py")]
     assert len(sources) > 80
     opening = {path for path in sources if _CLIENTS.search((ROOT / "service" / path).read_text(encoding="utf-8"))}
