@@ -235,8 +235,9 @@ def _with_its_noise(problem: FitProblem, fitted: Fit) -> Baseline:
 
 def _with_law(problem: FitProblem, fitted: Fit, laws: Laws) -> FitProblem:
     """The problem with the discrepancy of laws, whose form moves with V_S or does not: the likelier one."""
-    forms = [law_discrepancy(problem.design, laws, moving=moving) for moving in (False, True)]
-    problems = [replace(problem, law=LawTerms(form, form.columns(problem.design))) for form in forms]
+    either = [law_discrepancy(problem.design, laws, moving=moving) for moving in (False, True)]
+    laws_tried = {one.form: one for one in either}.values()  # one where V_S is anything
+    problems = [replace(problem, law=LawTerms(one, one.columns(problem.design))) for one in laws_tried]
     return max(problems, key=lambda one: _likeliest(gram_of(one, fitted), one).evidence)
 
 

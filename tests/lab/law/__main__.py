@@ -4,16 +4,13 @@ ARGS=--write).
 SIZE=full: 60 campaigns of measured curves with nothing hidden, 40 of each other kind, 15 of each formula.
 """
 
-import os
 from collections.abc import Sequence
-from dataclasses import asdict
-from functools import partial
 
 import numpy as np
 
+from tests.lab.law.kinds import tabulate
 from tests.lab.law.trials import Said, diagnosed
-from tests.lab.law.worlds import FORMULAS, measured
-from tests.measuring import Asked, Lines, each, publish, table, where
+from tests.lab.law.worlds import FORMULAS
 
 #: Kinds of campaigns with how many there are in the whole table.
 KINDS = (
@@ -49,19 +46,5 @@ def row(kind: str, found: Sequence[Said]) -> tuple[str, ...]:
     )
 
 
-def main() -> None:
-    asked, store = Asked.here(), Lines(os.environ.get("STORE") or None)
-    rows = []
-    for kind, count in KINDS.items():
-        if not kind.startswith(asked.only) or (kind not in FORMULAS and measured() is None):
-            continue
-        seeds = [asked.seed * 1000 + k for k in range(max(1, round(count * asked.size)))]
-        left = [(kind, seed) for seed in seeds if f"{kind} {seed}" not in store.known]
-        for said in each(diagnosed, left, where(2)):
-            store.get(f"{kind} {said.seed}", partial(asdict, said))
-        rows.append(row(kind, [Said(**store.known[f"{kind} {seed}"]) for seed in seeds]))
-    publish("diagnosis.md", "law", [f"`make law {asked}`:", "", *table(TITLES, rows)])
-
-
 if __name__ == "__main__":
-    main()
+    tabulate("law", KINDS, diagnosed, Said, TITLES, row)

@@ -1,17 +1,15 @@
 """`make law_adoption`: what the diagnosis of measured curves offers is adopted, and remaining life held against the truth
 (SEED= SIZE= ONLY= STORE= ARGS=--write). The end is where true mean COF is half of the first."""
 
-import os
 import tempfile
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
-from functools import partial
+from dataclasses import dataclass
 from pathlib import Path
 
 from models.prognosis.scoring import covered
 from tests.adoption.trials import asked
+from tests.lab.law.kinds import tabulate
 from tests.lab.law.worlds import sent_of_curves
-from tests.measuring import Asked, Lines, each, publish, table, where
 from tests.service.clients import client_on
 
 #: Kinds of campaigns with how many there are in the whole table.
@@ -82,19 +80,5 @@ def row(kind: str, found: Sequence[Adopted]) -> tuple[str, ...]:
     )
 
 
-def main() -> None:
-    asked_for, store = Asked.here(), Lines(os.environ.get("STORE") or None)
-    rows = []
-    for kind, count in KINDS.items():
-        if not kind.startswith(asked_for.only):
-            continue
-        seeds = [asked_for.seed * 1000 + k for k in range(max(1, round(count * asked_for.size)))]
-        left = [(kind, seed) for seed in seeds if f"{kind} {seed}" not in store.known]
-        for one in each(adopted, left, where(2)):
-            store.get(f"{kind} {one.seed}", partial(asdict, one))
-        rows.append(row(kind, [Adopted(**store.known[f"{kind} {seed}"]) for seed in seeds]))
-    publish("diagnosis.md", "law_adoption", [f"`make law_adoption {asked_for}`:", "", *table(TITLES, rows)])
-
-
 if __name__ == "__main__":
-    main()
+    tabulate("law_adoption", KINDS, adopted, Adopted, TITLES, row)

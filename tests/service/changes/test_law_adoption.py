@@ -48,10 +48,9 @@ def test_a_law_of_another_form_is_adopted_as_any_extension_is(tmp_path: Path) ->
         assert adopted["model"] == {"name": "extended", "effects": ["friction_law"]}
         by_law = client.get(f"{base}/remaining-useful-life").json()
         assert by_law["model"] == adopted["model"]
-        # both are means of what was fitted over the protocol's speeds, and friction falls everywhere by the same share
-        fractions = [answer["current"]["fraction_of_initial"] for answer in (by_eq3, by_law)]
-        truth = 1.0 - 0.33 * 12000 / 18000
-        assert abs(fractions[1] - truth) < max(abs(fractions[0] - truth), 0.004)
+        # a curve that fits leaves less open: 0.73 of eq. 3's deviation here, and friction falls everywhere by the same share
+        assert by_law["current"]["mean_cof_sd"] < 0.8 * by_eq3["current"]["mean_cof_sd"]
+        assert abs(by_law["current"]["fraction_of_initial"] - (1.0 - 0.33 * 12000 / 18000)) < 0.002
         post_run(client, _test(15000))
         assert client.get(f"{base}/remaining-useful-life").json()["runs_used"] == 7
         client.put(f"{base}/model", json={"diagnosis_id": None})
