@@ -152,7 +152,7 @@ def blocks(page: Path, *languages: str) -> list[tuple[str, str]]:
 
 def parts(text: str) -> dict[str, str]:
     """The parts of a document by name: what stands between `<!-- name -->` and `<!-- end -->`."""
-    found = re.findall(r"<!-- ([a-z -]+) -->\n(.*?)<!-- end -->", text, flags=re.DOTALL)
+    found = re.findall(r"<!-- ([a-z_ -]+) -->\n(.*?)<!-- end -->", text, flags=re.DOTALL)
     return {name: body.strip("\n") for name, body in found}
 
 
