@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from models.diagnosis import criteria
 from models.diagnosis.diagnose import diagnose
 from models.diagnosis.validation.held_out import Gain
 from tests.blind.rig.hide import Hidden, hide
@@ -66,6 +67,7 @@ class Outcome:
     advice: tuple[str, ...]  # keys of the advised tests, best first
     seconds: float  # of one core
     error: str = ""
+    isolability: tuple[tuple[str, float], ...] = ()  # ι of each candidate that was fitted
     advised: tuple["Outcome", ...] = ()  # what was said after each advised test that was made
 
     @property
@@ -110,6 +112,12 @@ class Outcome:
     @property
     def unexplained(self) -> bool:
         return self.verdict == "unexplained_structure"
+
+    @property
+    def isolable(self) -> bool:
+        """Whether the law's own doubt leaves half or more of what the data say of all that was hidden, as far as it was fitted."""
+        shares = dict(self.isolability)
+        return all(shares.get(slug, 1.0) >= criteria.ISOLABLE for slug in self.truth)
 
     @property
     def right_axis(self) -> bool:
@@ -167,4 +175,5 @@ def judged(trial: Trial, hidden: Hidden) -> Outcome:
         gain=report.gain,
         advice=tuple(one.key for one in report.advice),
         seconds=seconds,
+        isolability=tuple((one.effect, one.isolability) for one in report.candidates if one.isolability is not None),
     )

@@ -480,8 +480,8 @@ class Search:
         self, weights: Mapping[Alternative, float], isolabilities: Mapping[Alternative, Mapping[str, float]]
     ) -> tuple[dict[Alternative, float], dict[str, float]]:
         """The weights where a cause of which less than ISOLABLE is left beside the law's discrepancy is the law's: its
-        explanation counts as the same without it. And the probability of each such cause. ι is the larger one of that in
-        the explanation and that of the cause alone."""
+        explanation counts as the same without it. And the probability of each such cause. ι is that in the explanation, or
+        where that was not refitted that of the cause alone."""
         total = log_sum(list(weights.values()))
         merged: dict[Alternative, float] = {}
         like_the_law: dict[str, float] = {}
@@ -492,8 +492,8 @@ class Search:
                 *((alternative.unknown,) if alternative.unknown in FAULT_BY_SLUG else ()),
             ):
                 alone = NOTHING.and_effect(slug) or NOTHING
-                known = [shares[slug] for one in (alternative, alone) if slug in (shares := isolabilities.get(one, {}))]
-                if known and max(known) < criteria.ISOLABLE:
+                shares = isolabilities.get(alternative) or isolabilities.get(alone, {})
+                if shares.get(slug, 1.0) < criteria.ISOLABLE:
                     left = left.without(slug)
                     like_the_law[slug] = like_the_law.get(slug, 0.0) + float(np.exp(weight - total))
             merged[left] = float(np.logaddexp(merged.get(left, -np.inf), weight))

@@ -9,6 +9,7 @@ row, R the correlation of neighbours in a run, w ρ^{|i - j|} off the diagonal, 
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -60,6 +61,10 @@ def _filter(blocks: FloatArray, correlation: Correlation) -> None:
     blocks[:, 1:] = lfilter(numerator, [1.0, theta], blocks[:, 1:], axis=1, zi=start)[0]
 
 
+#: Turns columns [N, m] into their inner products [m, m].
+Products: TypeAlias = Callable[[FloatArray], FloatArray]
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Gains:
     """Whitened torque of each curve of each run: R runs, k curves of a run at most (neighbours share a gain beyond
@@ -72,7 +77,7 @@ class Gains:
 
     def along(self, columns: FloatArray) -> FloatArray:
         """Inner products [R, k, m] with whitened columns [N, m]."""
-        return np.reshape(self.directions @ columns, (*self.overlaps.shape[:2], -1))
+        return np.reshape(self.directions @ columns, (*self.overlaps.shape[:2], columns.shape[1]))
 
 
 def gains_of(design: Design, torque: FloatArray, noise: Noise) -> Gains:
@@ -98,29 +103,25 @@ def scatter_root(curves: int, run_gain: float, curve_gain: float) -> FloatArray:
     return np.asarray(curve_gain * np.eye(curves) + alike, dtype=np.float64)
 
 
-def whitening(
-    design: Design, torque: FloatArray, noise: Noise, law: FloatArray | None = None
-) -> Callable[[FloatArray], FloatArray]:
-    """V^{-1/2} of columns [N, m], gains taken along a torque [N] Nm: (1 + B Bᵀ)^{-1/2} with B = D K^{1/2} of the whitened
-    directions D; then in the same way with the columns C T [N, k] Nm of the law's discrepancy."""
+def metric(design: Design, torque: FloatArray, noise: Noise, law: FloatArray | None = None) -> Products:
+    """The inner products Xᵀ V⁻¹ X [m, m] of columns X [N, m] Nm, gains taken along a torque [N] Nm, with the columns C T
+    [N, k] Nm of the law's discrepancy. By Woodbury's formula the gains' whitened directions are taken off, then what is left
+    of the law's columns: no product with [N, m] is taken twice."""
     gains = gains_of(design, torque, noise)
     root = scatter_root(gains.overlaps.shape[-1], noise.run_gain, noise.curve_gain)
-    sizes, vectors = np.linalg.eigh(root.T @ gains.overlaps @ root)
-    sizes, combined = np.sqrt(1.0 + np.maximum(sizes, 0.0)), root @ vectors
-    shrink = (combined / (sizes * (1.0 + sizes))[:, None, :]) @ combined.mT
+    by_gain = np.linalg.solve(np.linalg.cholesky(np.eye(root.shape[1]) + root.T @ gains.overlaps @ root), root.T)
 
-    def white(columns: FloatArray) -> FloatArray:
-        columns = whitened(columns, design, noise)
-        removed = (shrink @ gains.along(columns)).reshape(-1, columns.shape[1])
-        return np.asarray(columns - gains.directions.T @ removed, dtype=np.float64)
+    def parts(columns: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Columns whitened, and what gains explain of them."""
+        white = whitened(columns, design, noise)
+        return white, np.concatenate(by_gain @ gains.along(white))
 
-    if law is None or not law.size:
-        return white
-    directions, lengths, _ = np.linalg.svd(white(law), full_matrices=False)
-    lost = (1.0 - 1.0 / np.hypot(1.0, lengths))[:, None]
+    laws, of_gains = parts(np.zeros((torque.size, 0)) if law is None else law)
+    by_law = np.linalg.inv(np.linalg.cholesky(np.eye(laws.shape[1]) + laws.T @ laws - of_gains.T @ of_gains))
 
-    def beside_law(columns: FloatArray) -> FloatArray:
-        columns = white(columns)
-        return np.asarray(columns - directions @ (lost * (directions.T @ columns)), dtype=np.float64)
+    def products(columns: FloatArray) -> FloatArray:
+        white, removed = parts(columns)
+        explained = by_law @ (laws.T @ white - of_gains.T @ removed)
+        return np.asarray(white.T @ white - removed.T @ removed - explained.T @ explained, dtype=np.float64)
 
-    return beside_law
+    return products

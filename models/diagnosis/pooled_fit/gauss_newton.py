@@ -20,7 +20,8 @@ from models.diagnosis.baseline.prediction import Prediction, predict
 from models.diagnosis.design.design import Design
 from models.diagnosis.effects.effect import SCALES
 from models.diagnosis.effects.fitted_effect import FittedEffect, law_columns
-from models.diagnosis.pooled_fit.problem import FitProblem, Priors, Whiten
+from models.diagnosis.noise.covariance import Products
+from models.diagnosis.pooled_fit.problem import FitProblem, Priors
 
 #: Gauss-Newton steps where the caller asks for no other number, and damped trials for each.
 STEPS = 30
@@ -60,13 +61,13 @@ def fit(problem: FitProblem, start: Laws, effects: Sequence[FittedEffect] = (), 
 
     Gains are taken along one torque (`FitProblem.gained`), which keeps the metric fixed while a fit moves.
     """
-    white, priors = problem.whitening(), problem.priors
-    state = _evaluated(problem, white, start, tuple(effects))
+    metric, priors = problem.metric(), problem.priors
+    state = _evaluated(problem, metric, start, tuple(effects))
     damping, growth = 1e-3, 2.0
     status = FitStatus.OUT_OF_STEPS
     for _ in range(steps):
         with np.errstate(over="ignore", invalid="ignore"):
-            gram, gradient = _normal(problem, white, state)
+            gram, gradient = _normal(problem, metric, state)
         if not np.isfinite(gram).all():
             status = FitStatus.NOT_FINITE
             break
@@ -75,7 +76,7 @@ def fit(problem: FitProblem, start: Laws, effects: Sequence[FittedEffect] = (), 
             step = _inside(state, priors, gram + damping * np.diag(np.diag(gram)), gradient)
             trial = _moved(state, priors, step)
             if trial is not None:
-                candidate = _evaluated(problem, white, *trial)
+                candidate = _evaluated(problem, metric, *trial)
                 expected = float(step @ gradient - 0.5 * step @ (gram @ step))
                 fallen = state.cost - candidate.cost
                 if np.isfinite(candidate.cost) and fallen > 0:
@@ -112,7 +113,7 @@ def _inside(state: Fit, priors: Priors, matrix: FloatArray, gradient: FloatArray
     return step
 
 
-def _evaluated(problem: FitProblem, white: Whiten, laws: Laws, effects: tuple[FittedEffect, ...]) -> Fit:
+def _evaluated(problem: FitProblem, metric: Products, laws: Laws, effects: tuple[FittedEffect, ...]) -> Fit:
     design, priors = problem.design, problem.priors
     with np.errstate(over="ignore", invalid="ignore"):  # a step too far: its cost is infinite, and it is not taken
         prediction = predict(design, laws)
@@ -122,7 +123,7 @@ def _evaluated(problem: FitProblem, white: Whiten, laws: Laws, effects: tuple[Fi
         residual = design.torque - torque
         cost = float("inf")
         if np.isfinite(residual).all():
-            cost = 0.5 * float((white(residual[:, None]) ** 2).sum())
+            cost = 0.5 * float(metric(residual[:, None])[0, 0])
             cost += 0.5 * float(((priors.rows @ laws.theta - priors.means) ** 2).sum())
             cost = sum((effect.effect.amplitude_cost(effect.amplitude) for effect in effects), cost)
     return Fit(
@@ -161,11 +162,10 @@ def prior_gram(priors: Priors, fitted: Fit) -> FloatArray:
     return gram
 
 
-def _normal(problem: FitProblem, white: Whiten, state: Fit) -> tuple[FloatArray, FloatArray]:
+def _normal(problem: FitProblem, metric: Products, state: Fit) -> tuple[FloatArray, FloatArray]:
     """Gram matrix and gradient over the free θ and the effects' parameters."""
-    columns = white(np.column_stack([sensitivities(problem, state), state.residual]))
-    free, left, prior = columns[:, :-1], columns[:, -1], prior_gram(problem.priors, state)
-    gram, gradient = free.T @ free + prior[:-1, :-1], free.T @ left + prior[:-1, -1]
+    whole = metric(np.column_stack([sensitivities(problem, state), state.residual])) + prior_gram(problem.priors, state)
+    gram, gradient = whole[:-1, :-1], whole[:-1, -1]
     diagonal = np.diag(gram)
     gram[np.diag_indices_from(gram)] = np.where(diagonal > 0, (1.0 + 1e-12) * diagonal, 1.0)
     return gram, gradient

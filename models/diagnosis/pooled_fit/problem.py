@@ -5,9 +5,7 @@ Priors are weak, scaled by the data, and rows of the least-squares problem like 
     ½ |R θ - m|²,     one row for each parameter, and one for each law whose two shares are expected to drift alike
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +16,7 @@ from models.diagnosis.baseline.law_discrepancy import LawDiscrepancy
 from models.diagnosis.baseline.law_form import EXACT, LawSizes
 from models.diagnosis.baseline.laws import ATTRACTOR, BLOCK, DRIFT, FALL, KAPPA, LOG_DECAY, OPEN_DRAG, SHARES, Frame
 from models.diagnosis.design.design import Design
-from models.diagnosis.noise.covariance import Noise, whitening
+from models.diagnosis.noise.covariance import Noise, Products, metric
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -86,10 +84,6 @@ class LawTerms:
         return self.columns[:, deviations > 0.0] * deviations[deviations > 0.0]
 
 
-#: Turns columns [N, m] into their whitened form.
-Whiten: TypeAlias = Callable[[FloatArray], FloatArray]
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FitProblem:
     """A least-squares problem."""
@@ -118,7 +112,7 @@ class FitProblem:
         """The problem with the law taken for exact."""
         return replace(self, law=None, noise=replace(self.noise, law=EXACT))
 
-    def whitening(self, noise: Noise | None = None) -> Whiten:
-        """V^{-1/2} of the problem's noise, or of another one."""
+    def metric(self, noise: Noise | None = None) -> Products:
+        """V⁻¹ of the problem's noise, or of another one."""
         noise = noise or self.noise
-        return whitening(self.design, self.gained, noise, None if self.law is None else self.law.scaled(noise.law))
+        return metric(self.design, self.gained, noise, None if self.law is None else self.law.scaled(noise.law))

@@ -28,7 +28,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.interpolate import CubicSpline
-from scipy.linalg import solve_triangular
+from scipy.linalg.lapack import dtrtri
 from scipy.special import log_softmax, logsumexp
 
 from models.arrays import FloatArray
@@ -109,9 +109,10 @@ class Gram:
 
 @dataclass(frozen=True, slots=True)
 class _Factored:
-    """A Cholesky factor of a positive matrix [b, b] that was scaled to ones on its diagonal."""
+    """The inverse of a Cholesky factor of a positive matrix [b, b] that was scaled to ones on its diagonal: its products
+    with many columns take a tenth of the time of solving for them."""
 
-    factor: FloatArray
+    inverse: FloatArray
     scale: FloatArray
 
     @classmethod
@@ -119,19 +120,16 @@ class _Factored:
         """A correlation matrix may be singular to rounding: more of a ridge than rounding would change determinants."""
         scale = 1 / np.sqrt(np.maximum(np.diag(matrix), 1e-300))
         factor = np.linalg.cholesky(matrix * scale[:, None] * scale + ridge * np.eye(scale.size))
-        return cls(np.asarray(factor, dtype=np.float64), scale)
+        return cls(np.asarray(dtrtri(factor, lower=True)[0] if scale.size else factor, dtype=np.float64), scale)
 
     def solve(self, columns: FloatArray) -> FloatArray:
         """L⁻¹ of columns [b, n]."""
-        if not self.scale.size:
-            return columns
-        solved = solve_triangular(self.factor, columns * self.scale[:, None], lower=True, check_finite=False)
-        return np.asarray(solved, dtype=np.float64)
+        return np.asarray(self.inverse @ (columns * self.scale[:, None]), dtype=np.float64)
 
     @property
     def log_determinant(self) -> float:
         """Of the matrix [nats]."""
-        return 2.0 * float(np.log(np.diag(self.factor)).sum() - np.log(self.scale).sum())
+        return -2.0 * float(np.log(np.diag(self.inverse)).sum() + np.log(self.scale).sum())
 
 
 def gram_of(
@@ -398,9 +396,8 @@ def learned_law(problem: FitProblem, fitted: Fit) -> LearnedLaw | None:
         return None
     deviations = problem.law.discrepancy.form.deviations(problem.noise.law)
     columns = np.column_stack([problem.law.columns * deviations, fitted.residual])
-    white = problem.whitening(replace(problem.noise, law=EXACT))(columns)
-    beside, residual = white[:, :-1], white[:, -1]
-    coefficients = np.linalg.solve(np.eye(deviations.size) + beside.T @ beside, beside.T @ residual)
+    products = problem.metric(replace(problem.noise, law=EXACT))(columns)
+    coefficients = np.linalg.solve(np.eye(deviations.size) + products[:-1, :-1], products[:-1, -1])
     return LearnedLaw(form=problem.law.discrepancy.form, coefficients=deviations * coefficients)
 
 

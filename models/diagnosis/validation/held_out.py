@@ -160,19 +160,17 @@ def _forecast_score(model: FittedModel, out: BoolArray) -> float:
     refit = fit(before, model.fit.laws, model.fit.effects, steps=criteria.FEW_STEPS)
     law = np.zeros((out.size, 0)) if problem.law is None else problem.law.scaled(problem.noise.law)
     jacobian = np.column_stack([sensitivities(problem, refit), law])
-    fitted = problem.whitening(_without(noise, out))(jacobian)
+    precision = problem.metric(_without(noise, out))(jacobian)
     residual_of_out = np.column_stack([jacobian, refit.residual - law_torque(before, refit)])
-    whitened = problem.whitening(_without(noise, ~out))(residual_of_out)
-    precision = fitted.T @ fitted
+    products = problem.metric(_without(noise, ~out))(residual_of_out)
     own = precision.shape[0] - law.shape[1]
     precision[:own, :own] += prior_gram(problem.priors, refit)[:-1, :-1]
     precision[own:, own:] += np.eye(law.shape[1])
     precision[np.diag_indices_from(precision)] *= 1.0 + 1e-12
-    columns, residual = whitened[:, :-1], whitened[:, -1]
     scale = 1 / np.sqrt(np.diag(precision))
-    inner = (precision + columns.T @ columns) * scale[:, None] * scale
-    along = (columns.T @ residual) * scale
-    quadratic = float(residual @ residual) - float(along @ np.linalg.solve(inner, along))
+    inner = (precision + products[:-1, :-1]) * scale[:, None] * scale
+    along = products[:-1, -1] * scale
+    quadratic = float(products[-1, -1]) - float(along @ np.linalg.solve(inner, along))
     logdet = float(np.linalg.slogdet(inner)[1] - np.linalg.slogdet(precision * scale[:, None] * scale)[1])
     return -0.5 * (quadratic + logdet)
 
@@ -187,8 +185,7 @@ def _held(before: FittedModel, after: FittedModel, out: BoolArray) -> _Held:
             refit = fit(masked, bridged, refit.effects, steps=0)
         errors.append(np.where(out, refit.residual - law_torque(masked, refit), 0.0))
     problem = after.problem
-    white = problem.whitening(replace(problem.noise, law=EXACT))
-    squares = np.square(white(np.stack(errors, axis=1))).sum(axis=0)
+    squares = np.diag(problem.metric(replace(problem.noise, law=EXACT))(np.stack(errors, axis=1)))
     rows = np.flatnonzero(out)
     return _Held(rows=rows, before=errors[0][rows], after=errors[1][rows], score=0.5 * float(squares[0] - squares[1]))
 

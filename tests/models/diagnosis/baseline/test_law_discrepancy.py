@@ -104,7 +104,7 @@ def test_the_sizes_considered_are_a_distribution() -> None:
     assert LawSizes(*criteria.USUAL_LAW) in dict(known)
 
 
-# --- Columns, whitening, evidence and posterior mean against dense matrices.
+# --- Columns, metric, evidence and posterior mean against dense matrices.
 
 
 @pytest.fixture(scope="module")
@@ -160,17 +160,14 @@ def test_columns_are_what_a_change_of_the_law_changes(given: Study) -> None:
     assert not np.allclose(law.columns[loop, 0], unlagged, rtol=1e-3)
 
 
-def test_whitening_beside_the_law_is_the_inverse_root_of_the_dense_matrix(problem: FitProblem) -> None:
+def test_products_beside_the_law_are_those_of_the_dense_inverse(problem: FitProblem) -> None:
     covariance = dense(problem, SIZES, problem.gained)
     probe = np.random.default_rng(3).standard_normal((problem.design.torque.size, 3)) * problem.noise.deviation[:, None]
-    white = problem.whitening()(probe)
     expected = probe.T @ np.linalg.solve(covariance, probe)
-    np.testing.assert_allclose(white.T @ white, expected, rtol=1e-6)
+    np.testing.assert_allclose(problem.metric()(probe), expected, rtol=1e-6)
     # the control: with the exact law it is that of the rest
-    bare = problem.whitening(replace(problem.noise, law=EXACT))(probe)
-    np.testing.assert_allclose(
-        bare.T @ bare, probe.T @ np.linalg.solve(dense(problem, EXACT, problem.gained), probe), rtol=1e-6
-    )
+    bare = problem.metric(replace(problem.noise, law=EXACT))(probe)
+    np.testing.assert_allclose(bare, probe.T @ np.linalg.solve(dense(problem, EXACT, problem.gained), probe), rtol=1e-6)
 
 
 @pytest.mark.parametrize("sizes", [EXACT, SIZES, LawSizes(0.02, 0.0, 0.0)])

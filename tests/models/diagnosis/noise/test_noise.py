@@ -20,7 +20,7 @@ from models.diagnosis.design.design import Design, build_design
 from models.diagnosis.design.loop_bins import BINS, period_differences
 from models.diagnosis.explanations.verdict import Verdict
 from models.diagnosis.noise import estimate
-from models.diagnosis.noise.covariance import Noise, gains_of, whitening
+from models.diagnosis.noise.covariance import Noise, gains_of, metric
 from models.diagnosis.noise.estimate import estimate_noise, first_noise, unlike
 from models.diagnosis.pooled_fit.baseline_fit import fit_baseline
 from models.records.runs import Record
@@ -118,7 +118,7 @@ def test_an_arma_process_has_the_correlations_that_it_was_made_for(share: float,
 
 
 @pytest.mark.parametrize(("sigma", "lost"), [(2.0, 0), (2.0, 1), (0.02, 0)])
-def test_whitening_is_the_inverse_root_of_the_covariance(sigma: float, lost: int) -> None:
+def test_the_metric_is_the_inverse_of_the_covariance(sigma: float, lost: int) -> None:
     """Also where a run that lost a plateau lies between runs that are alike."""
     first, second, *later = campaign(1).stationary
     shorter = replace(second, plateaus=second.plateaus.take(np.arange(second.plateaus.torque.size - lost)))
@@ -142,11 +142,11 @@ def test_whitening_is_the_inverse_root_of_the_covariance(sigma: float, lost: int
     own = rng.standard_normal(int(design.curve.max()) + 1)  # noise alone, and a gain of each curve alone
     probe = np.zeros((design.torque.size, 2))
     probe[rows] = np.stack([rng.standard_normal(rows.size), torque * 0.002 * own[design.curve[rows]]], axis=1)
-    white = whitening(design, design.torque, noise)(probe)
+    products = metric(design, design.torque, noise)(probe)
     expected = probe[rows].T @ np.linalg.solve(covariance, probe[rows])
     # the filter starts from a row's own past that is not known: a part in hundred
     scale = np.sqrt(np.diag(expected))
-    np.testing.assert_allclose(white.T @ white / np.outer(scale, scale), expected / np.outer(scale, scale), atol=0.02)
+    np.testing.assert_allclose(products / np.outer(scale, scale), expected / np.outer(scale, scale), atol=0.02)
 
 
 def test_beyond_so_many_pressures_neighbours_share_a_gain(design: Design, monkeypatch: pytest.MonkeyPatch) -> None:
