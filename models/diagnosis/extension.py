@@ -27,7 +27,7 @@ from models.diagnosis.campaign import Campaign, Oil, StationaryRun
 from models.diagnosis.design.design import Points, build_design, points_of
 from models.diagnosis.design.facts import REFERENCES, Facts, facts_of
 from models.diagnosis.effects.catalogue import BY_SLUG
-from models.diagnosis.effects.effect import Discrepancy, Kind
+from models.diagnosis.effects.effect import Discrepancy, EffectKind
 from models.diagnosis.effects.fitted_effect import Draw, FittedEffect, Ranges
 
 #: How answers name the law as found where it is in force in place of eq. 3; no effect of the catalogue.
@@ -68,7 +68,7 @@ class Extension:
                 clock = None if run.time is None else tuple(np.asarray(run.time)[rows].tolist())
                 part = replace(run, plateaus=run.plateaus.take(rows), time=clock, record=None)
                 points = build_design(replace(campaign, stationary=(part,), dynamic=())).points
-                torque[:, rows] = points.sign * self._changes(points, self._facts(campaign), Kind.ARTEFACT)
+                torque[:, rows] = points.sign * self._changes(points, self._facts(campaign), EffectKind.ARTEFACT)
         return torque
 
     @property
@@ -81,7 +81,9 @@ class Extension:
     def has_course(self) -> bool:
         """Whether any draw follows an effect of use along the life."""
         return bool(self.content["courses"]) and any(
-            BY_SLUG[effect["slug"]].kind is Kind.COURSE for draw in self.content["draws"] for effect in draw["effects"]
+            BY_SLUG[effect["slug"]].kind is EffectKind.COURSE
+            for draw in self.content["draws"]
+            for effect in draw["effects"]
         )
 
     def course(self, cycles: FloatArray, pressure: FloatArray, velocity: FloatArray) -> FloatArray:
@@ -93,7 +95,7 @@ class Extension:
         grid = np.broadcast_arrays(cycles[:, None, None], pressure[:, None], velocity)
         at, under, moving = (np.ravel(axis) for axis in grid)
         points = points_of(at.size, cycles=at, pressure=under, velocity=moving)  # not measured: no clock, no neighbours
-        changes = self._changes(points, facts_from(self.content["facts"]), Kind.COURSE)
+        changes = self._changes(points, facts_from(self.content["facts"]), EffectKind.COURSE)
         return np.asarray(changes.reshape(shape).mean(axis=3), dtype=np.float64)
 
     def _facts(self, campaign: Campaign) -> Facts:
@@ -102,7 +104,7 @@ class Extension:
         names = ("states", "first_moment", "last_moment", "plate_warming", *REFERENCES)
         return replace(facts_of(campaign), **{name: getattr(stored_facts, name) for name in names})
 
-    def _changes(self, points: Points, facts: Facts, kind: Kind) -> FloatArray:
+    def _changes(self, points: Points, facts: Facts, kind: EffectKind) -> FloatArray:
         """Changes [d, P] Nm of one kind under each draw."""
         ranges: Ranges = {Discrepancy(name): (low, width) for name, (low, width) in self.content["ranges"].items()}
         scenes = [scene_of(_laws(laws), points, facts) for laws in self.content["laws"]]

@@ -226,6 +226,11 @@ class VisibleOut(base.Answer):
     )
     least: Number = Field(default=None, description="The amplitude that is visible in the most visible shape")
     unit: str = Field(description="Its unit")
+    isolability: Number = Field(
+        default=None,
+        description="Share of its evidence that is left when the friction curve may have another form than eq. 3, 0 to 1; "
+        "below 0.5 these tests cannot tell it from the form of the curve",
+    )
 
 
 class PairOut(base.Answer):

@@ -162,7 +162,14 @@ def counts() -> list[Count]:
         lines += [
             Count(f"{title}: detected", row, lambda o: o.detected),
             Count(f"{title}: true cause in the set", row, lambda o: o.in_set, 0.97 if lam >= 50 else None),
-            Count(f"{title}: named rightly", row, lambda o: o.right, 0.90 if lam >= 80 else None),
+            Count(f"{title}: named rightly", row, lambda o: o.right),
+            Count(
+                "… of those with an isolability of 0.5 or more",
+                row,
+                lambda o: o.right,
+                0.90 if lam >= 80 else None,
+                among=lambda o: o.isolable,
+            ),
             Count(f"{title}: named and wrong", row, lambda o: o.wrong, most=0.015),
         ]
     lines += [

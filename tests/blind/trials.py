@@ -11,6 +11,8 @@ import numpy as np
 
 from models.diagnosis import criteria
 from models.diagnosis.diagnose import diagnose
+from models.diagnosis.effects.catalogue import BY_SLUG
+from models.diagnosis.effects.effect import EffectKind
 from models.diagnosis.validation.held_out import Gain
 from tests.blind.rig.hide import Hidden, hide
 from tests.blind.rig.loudness import UnreachableError
@@ -67,7 +69,7 @@ class Outcome:
     advice: tuple[str, ...]  # keys of the advised tests, best first
     seconds: float  # of one core
     error: str = ""
-    isolability: tuple[tuple[str, float], ...] = ()  # ι of each candidate that was fitted
+    isolability: tuple[tuple[str, float], ...] = ()  # ι of each effect that these tests show
     advised: tuple["Outcome", ...] = ()  # what was said after each advised test that was made
 
     @property
@@ -115,9 +117,13 @@ class Outcome:
 
     @property
     def isolable(self) -> bool:
-        """Whether the law's own doubt leaves half or more of what the data say of all that was hidden, as far as it was fitted."""
+        """Whether the law's own doubt leaves half or more of what the data say of all that was hidden; vibrations are seen
+        in raw records, where there is no law."""
         shares = dict(self.isolability)
-        return all(shares.get(slug, 1.0) >= criteria.ISOLABLE for slug in self.truth)
+        return all(
+            BY_SLUG[slug].kind is EffectKind.VIBRATION or shares.get(slug, 0.0) >= criteria.ISOLABLE
+            for slug in self.truth
+        )
 
     @property
     def right_axis(self) -> bool:
@@ -175,5 +181,5 @@ def judged(trial: Trial, hidden: Hidden) -> Outcome:
         gain=report.gain,
         advice=tuple(one.key for one in report.advice),
         seconds=seconds,
-        isolability=tuple((one.effect, one.isolability) for one in report.candidates if one.isolability is not None),
+        isolability=tuple((one.effect, one.isolability) for one in report.visible),
     )

@@ -38,7 +38,7 @@ FROM_THE_START = -1.0
 Shape: TypeAlias = tuple[float, ...]
 
 
-class Kind(StrEnum):
+class EffectKind(StrEnum):
     """ARTEFACT: in the measurement or the test's conditions; COURSE: in the clutch's life; LAG: in loops only;
     VIBRATION: seen in raw records."""
 
@@ -116,7 +116,7 @@ class Effect:
     physics: str = ""  # a sentence; none for what is never named, as the next two
     formula: str = ""  # the change of torque
     source: str = ""
-    kind: Kind
+    kind: EffectKind
     channels: tuple[str, ...] = ()  # what must have been measured or sent for it to be judged (public names)
     amplitude: str  # its name
     unit: str

@@ -15,7 +15,7 @@ from models.arrays import FloatArray
 from models.diagnosis.baseline.laws import Scene, curve
 from models.diagnosis.design.design import CLOCK, CYCLES, PRESSURE, SPEED, IntArray
 from models.diagnosis.design.facts import Facts
-from models.diagnosis.effects.effect import CREEPS, Effect, Kind, Shape, ShapeParameter, Tried, begins
+from models.diagnosis.effects.effect import CREEPS, Effect, EffectKind, Shape, ShapeParameter, Tried, begins
 from models.friction.stribeck import PARAMETER_NAMES
 
 #: The first shape of a gain over life says whether it steps (at the cycle that follows) or creeps (by the power).
@@ -99,7 +99,7 @@ def _fault(
     return Effect(
         slug=slug,
         title=title,
-        kind=Kind.ARTEFACT,
+        kind=EffectKind.ARTEFACT,
         amplitude="size",
         unit="-",
         prior_sd=0.02,  # of all of them

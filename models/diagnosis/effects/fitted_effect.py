@@ -24,7 +24,7 @@ from models.arrays import FloatArray
 from models.diagnosis.baseline.laws import BLOCKS, RAISED, Laws, Scene
 from models.diagnosis.baseline.prediction import Prediction, predict
 from models.diagnosis.design.design import Design, Points
-from models.diagnosis.effects.effect import Discrepancy, Effect, Kind, Shape
+from models.diagnosis.effects.effect import Discrepancy, Effect, EffectKind, Shape
 from models.friction.criteria import Z90
 
 #: Steps of the differences: shares of the prior deviation and of a shape's range; and of a law's largest value.
@@ -100,7 +100,7 @@ class FittedEffect:
                 [factors_at(scene.points, self.effect, ranges), small_factors_at(scene.points, ranges)], axis=1
             )
             change = change * (1.0 + factors @ np.array(self.factors))
-        return np.maximum(change, -scene.curve) if self.effect.kind is Kind.COURSE else change
+        return np.maximum(change, -scene.curve) if self.effect.kind is EffectKind.COURSE else change
 
 
 def law_columns(design: Design, prediction: Prediction, effects: Sequence[FittedEffect]) -> FloatArray:
@@ -189,7 +189,7 @@ class Draw:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Estimate:
+class AmplitudeEstimate:
     """The amplitude of an effect in engineering units."""
 
     name: str

@@ -12,7 +12,16 @@ import numpy as np
 from models.arrays import FloatArray
 from models.diagnosis.baseline.laws import Scene
 from models.diagnosis.design.facts import Facts
-from models.diagnosis.effects.effect import Discrepancy, Effect, Felt, Kind, Shape, ShapeParameter, Tried, of_twice
+from models.diagnosis.effects.effect import (
+    Discrepancy,
+    Effect,
+    EffectKind,
+    Felt,
+    Shape,
+    ShapeParameter,
+    Tried,
+    of_twice,
+)
 
 #: Whether what a rest did settles with use alone, or by the test's clock as well; and the log of its settling time [s],
 #: which with use alone stays where it is.
@@ -48,7 +57,7 @@ RUNNING_IN = Effect(
     check="look up how long the clutch was run in",
     formula="a M_s ∂S/∂M_s e^{-ζ/ζ_r}, or a S e^{-ζ/ζ_r}",
     source="Ompusunggu et al. 2013, section 2.3.1: 200 cycles of running-in before cycle 0",
-    kind=Kind.COURSE,
+    kind=EffectKind.COURSE,
     amplitude="difference of the new clutch's friction from its settled value",
     states="The new clutch's friction was {} above its settled value.",
     states_below="The new clutch's friction was {} below its settled value.",
@@ -100,7 +109,7 @@ OIL_CHANGE = Effect(
     check="look up when oil was changed or topped up",
     formula="a (C_v |v|^γ + k M̄_c ∂S/∂M̄_c) (1 - l (1 - e^{-2(ζ - ζ_k)/ζ_last})) after ζ_k",
     source="maintenance practice; friction modifiers deplete with use",
-    kind=Kind.COURSE,
+    kind=EffectKind.COURSE,
     amplitude="step of viscous friction",
     states="Viscous friction stepped up by {}.",
     states_below="Viscous friction stepped down by {}.",
@@ -143,7 +152,7 @@ ACCELERATED_WEAR = Effect(
     check="inspect the lining for glazing and torn fibres",
     formula="-a M_s ∂S/∂M_s ((ζ - ζ_k)₊/(ζ_last - ζ_k))^q",
     source="Ompusunggu et al. 2013, figs. 4 and 5: glazing and lost porosity",
-    kind=Kind.COURSE,
+    kind=EffectKind.COURSE,
     amplitude="further loss of static torque by the last state",
     states="Static torque lost {} more by the last state.",
     unit="%",
@@ -188,7 +197,7 @@ LOAD_SEVERITY = Effect(
     check="compare logged with intended energy per engagement, over the life",
     formula="S(ζ_e) - S(ζ), ζ_e = Σ (E/E_usual)^m over the engagements whose energy was sent",
     source="models.degradation.general_order: dD/dζ = -k Dⁿ with k by the load's severity",
-    kind=Kind.COURSE,
+    kind=EffectKind.COURSE,
     channels=("energy_per_cycle_kj",),
     amplitude="severity exponent m (1: proportional)",
     unit="-",
@@ -246,7 +255,7 @@ REST_RECOVERY = Effect(
     formula="a S (ln(1 + rest/1 h)/ln(1 + longest/1 h))^r e^{-(ζ - ζ_rest)/ζ_c}, S or M_s ∂S/∂M_s; with the clock also "
     "e^{-(t - t_rest)/τ}",
     source="boundary films of friction modifiers re-form at rest",
-    kind=Kind.COURSE,
+    kind=EffectKind.COURSE,
     channels=("started_at",),
     amplitude="change of friction at the end of the longest rest",
     states="Friction was {} higher right after the longest rest.",

@@ -23,7 +23,7 @@ from models.diagnosis.baseline.laws import OPEN_DRAG
 from models.diagnosis.baseline.prediction import Prediction, predict
 from models.diagnosis.design.design import Design
 from models.diagnosis.effects.fitted_effect import factors_at, ranges_of
-from models.diagnosis.pooled_fit.gauss_newton import Fit
+from models.diagnosis.pooled_fit.gauss_newton import PooledFit
 from models.diagnosis.pooled_fit.problem import FitProblem, LawTerms
 from models.diagnosis.pooled_fit.projection import Gram, gram_of, project
 
@@ -31,7 +31,7 @@ from models.diagnosis.pooled_fit.projection import Gram, gram_of, project
 class CandidateDistances:
     """Distances of candidates, on what was measured and with rows to come."""
 
-    def __init__(self, problem: FitProblem, fits: tuple[Fit, ...]) -> None:
+    def __init__(self, problem: FitProblem, fits: tuple[PooledFit, ...]) -> None:
         free = problem.priors.free.copy()
         free[OPEN_DRAG] = True  # a trial with the clutch open brings a drag that no measurement has determined yet
         problem = replace(problem, priors=replace(problem.priors, free=free))
@@ -105,7 +105,7 @@ class CandidateDistances:
         return grams
 
 
-def _torque(design: Design, prediction: Prediction, fit: Fit) -> FloatArray:
+def _torque(design: Design, prediction: Prediction, fit: PooledFit) -> FloatArray:
     """[N] Nm of a candidate at the rows."""
     changes = [effect.rows(design, prediction) for effect in fit.effects]
     return np.asarray(prediction.torque + sum(changes, np.zeros_like(prediction.torque)), dtype=np.float64)

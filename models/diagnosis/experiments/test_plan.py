@@ -25,7 +25,7 @@ from models.diagnosis.effects.thermal import AT_ONCE, OIL_TEMPERATURE
 from models.diagnosis.experiments.candidates import TRIALS, Step, runs_of, steps_of, with_trial
 from models.diagnosis.experiments.information import CandidateDistances
 from models.diagnosis.explanations.verdict import Fitted, Judgement
-from models.diagnosis.pooled_fit.gauss_newton import Fit
+from models.diagnosis.pooled_fit.gauss_newton import PooledFit
 from models.diagnosis.pooled_fit.problem import FitProblem
 from models.diagnosis.pooled_fit.projection import Gram
 
@@ -157,7 +157,7 @@ def distinguished(nats: FloatArray, lead: FloatArray | float = 0.0) -> FloatArra
     return np.asarray(ndtr((lead + nats - odds) / sd), dtype=np.float64)
 
 
-def _names(best: Fit, rival: Fit | None) -> tuple[str, str]:
+def _names(best: PooledFit, rival: PooledFit | None) -> tuple[str, str]:
     """An effect of the best that the rival does not have, and one of the rival."""
     leading = [effect.effect.slug for effect in best.effects]
     rival_names = [effect.effect.slug for effect in rival.effects] if rival is not None else []
@@ -165,7 +165,7 @@ def _names(best: Fit, rival: Fit | None) -> tuple[str, str]:
     return distinguishing[0], next((slug for slug in rival_names if slug not in leading), BASELINE)
 
 
-def bare(fit: Fit) -> Fit:
+def bare(fit: PooledFit) -> PooledFit:
     """Its baseline without the effects."""
     return replace(fit, torque=fit.prediction.torque, effects=())
 
@@ -188,7 +188,7 @@ def trials_of(campaign: Campaign, design: Design, distances: CandidateDistances)
     return trials
 
 
-def _thermometer(campaign: Campaign, problem: FitProblem, fits: Sequence[Fit]) -> list[Advice]:
+def _thermometer(campaign: Campaign, problem: FitProblem, fits: Sequence[PooledFit]) -> list[Advice]:
     """Where oil temperature was not measured and would be mistaken for a shifted zero: measure it, and change it.
 
     What that brings is λ of a temperature effect of the usual size, which a shifted zero does not have.

@@ -22,7 +22,7 @@ from models.diagnosis.baseline.law_form import LawSizes
 from models.diagnosis.design.design import Design
 from models.diagnosis.effects.fitted_effect import discrepancy_factors, ranges_of, small_factors_at
 from models.diagnosis.explanations.contrasts import contrasts_of
-from models.diagnosis.pooled_fit.gauss_newton import Fit
+from models.diagnosis.pooled_fit.gauss_newton import PooledFit
 from models.diagnosis.pooled_fit.problem import FitProblem
 from models.diagnosis.pooled_fit.projection import Gram, Projected, gram_of, isolability, projections_beside
 from models.gaussian_evidence import independent, log_gain, log_gain_alone, log_mean, log_sum
@@ -40,7 +40,9 @@ class Evidence:
     screened: tuple[Projected, ...]
 
 
-def evidence_of(problem: FitProblem, fitted: Fit, beside: FloatArray | None = None, *, smooth: bool = True) -> Evidence:
+def evidence_of(
+    problem: FitProblem, fitted: PooledFit, beside: FloatArray | None = None, *, smooth: bool = True
+) -> Evidence:
     """The evidence about a fit, with changes [N, m] Nm `beside` it projected for the screen of one thing more, and smooth
     structure beside it unless not wanted."""
     design = problem.design
@@ -85,7 +87,7 @@ def evidence_of(problem: FitProblem, fitted: Fit, beside: FloatArray | None = No
     )
 
 
-def _isolability(problem: FitProblem, fitted: Fit, likely: Projected) -> tuple[float, ...]:
+def _isolability(problem: FitProblem, fitted: PooledFit, likely: Projected) -> tuple[float, ...]:
     """ι of each effect as it was fitted, beside the baseline without effects: whether something is at work there, not how
     well its amplitude is known."""
     if not fitted.effects:
@@ -96,7 +98,7 @@ def _isolability(problem: FitProblem, fitted: Fit, likely: Projected) -> tuple[f
     return tuple(np.clip(alone, 0.0, 1.0).tolist())
 
 
-def visible_contrasts(problem: FitProblem, fitted: Fit) -> tuple[FloatArray, list[str]]:
+def visible_contrasts(problem: FitProblem, fitted: PooledFit) -> tuple[FloatArray, list[str]]:
     """The contrasts [N, m] Nm, with their axes, of which most is visible beside a law that is off by USUAL_LAW: what is not
     is a difference of the law, and the law has it already."""
     contrasts, axes = contrasts_of(problem.design, fitted.prediction)
@@ -106,7 +108,7 @@ def visible_contrasts(problem: FitProblem, fitted: Fit) -> tuple[FloatArray, lis
     return contrasts[:, shown], list(compress(axes, shown))
 
 
-def template_errors(design: Design, fitted: Fit) -> tuple[list[FloatArray], FloatArray]:
+def template_errors(design: Design, fitted: PooledFit) -> tuple[list[FloatArray], FloatArray]:
     """By effect the factors φ [N, m] at the rows with which it may be off, and over all effects [Σ m] 1 for those in which
     an effect's form is uncertain by itself, 0 for the others."""
     small = small_factors_at(design.rows, ranges_of(design.rows))
@@ -117,7 +119,7 @@ def template_errors(design: Design, fitted: Fit) -> tuple[list[FloatArray], Floa
     )
 
 
-def off_by(design: Design, fitted: Fit, factors: Sequence[FloatArray]) -> FloatArray:
+def off_by(design: Design, fitted: PooledFit, factors: Sequence[FloatArray]) -> FloatArray:
     """The changes [N, Σ m] Nm by every factor [N, m] with which the effects may be off."""
     rows = [effect.rows(design, fitted.prediction) for effect in fitted.effects]
     changes = [change[:, None] * effect_factors for change, effect_factors in zip(rows, factors, strict=True)]
@@ -149,7 +151,7 @@ def _likeliest(projected: Projected, mine: FloatArray) -> FloatArray:
     return np.asarray(vectors @ (score / (values + size**-2.0)))
 
 
-def _log_prior(fitted: Fit) -> float:
+def _log_prior(fitted: PooledFit) -> float:
     """The normalisation of the priors of the effects' amplitudes and smooth shapes [nats]. An amplitude of one sign has all
     of its prior there; one at its bound has one side of it, which `_beside_bounds` counts twice."""
     logs = [e.effect.log_amplitude_peak + 0.5 * float(np.log(e.precisions[1:]).sum()) for e in fitted.effects]
@@ -157,7 +159,7 @@ def _log_prior(fitted: Fit) -> float:
     return sum(logs) + float(np.log(2.0)) * halves
 
 
-def _held_at_bounds(gram: Gram, first: int, fitted: Fit) -> tuple[Gram, FloatArray]:
+def _held_at_bounds(gram: Gram, first: int, fitted: PooledFit) -> tuple[Gram, FloatArray]:
     """The Gram matrix with what is at a bound before the changes [h], and which way is out for each [h] ±1; the effects'
     columns begin at `first`."""
     ways: list[float] = []  # 0 for what is free

@@ -33,7 +33,7 @@ from scipy.special import expit
 from models.arrays import FloatArray
 from models.diagnosis import criteria
 from models.diagnosis.effects.catalogue import BY_SLUG, Column, columns_at_rows, columns_of, effects_for
-from models.diagnosis.effects.effect import SCALES, Kind, Shape
+from models.diagnosis.effects.effect import SCALES, EffectKind, Shape
 from models.diagnosis.effects.faults import FAULT_BY_SLUG, FAULTS
 from models.diagnosis.effects.fitted_effect import FittedEffect
 from models.diagnosis.effects.history import OIL_CHANGE
@@ -43,9 +43,9 @@ from models.diagnosis.explanations.shapeless import highest_line, line_evidence,
 from models.diagnosis.explanations.verdict import LINE, LINES, NOTHING, OUTLIER, Alternative, is_axis
 from models.diagnosis.noise.estimate import unlike
 from models.diagnosis.pooled_fit.baseline_fit import Baseline
-from models.diagnosis.pooled_fit.gauss_newton import Fit, fit, refit, refit_beside
+from models.diagnosis.pooled_fit.gauss_newton import PooledFit, fit, refit, refit_beside
 from models.diagnosis.pooled_fit.problem import FitProblem
-from models.diagnosis.pooled_fit.projection import Projected, Screened, left_over
+from models.diagnosis.pooled_fit.projection import Projected, Screened, isolability, left_over
 from models.diagnosis.raw_records.evidence import RawEvidence
 from models.gaussian_evidence import log_gain_alone, log_positive, log_sum
 
@@ -107,7 +107,7 @@ Key: TypeAlias = tuple[Alternative, Kinds]
 class Node:
     """An alternative that was refitted."""
 
-    fit: Fit
+    fit: PooledFit
     evidence: Evidence
     shape_evidence: tuple[float, ...]  # of its kind of shapes [nats]
     log_evidence: float  # with that, and that of raw records
@@ -130,8 +130,8 @@ class Posterior:
     problem: FitProblem  # that all refits share
     columns: tuple[Column, ...]  # that were screened
     refits: int
-    #: ι of each cause that was refitted, the largest of its explanations'; and the probability of those that were counted as
-    #: the law's form, for they cannot be told from it.
+    #: ι of each cause, the largest of its explanations', or where it was not refitted that of the shape which the screen
+    #: likes best; and the probability of those that were counted as the law's form, for they cannot be told from it.
     isolability: Mapping[str, float]
     like_the_law: Mapping[str, float]
 
@@ -333,7 +333,7 @@ class Search:
     def _add(
         self,
         alternative: Alternative,
-        start: Fit,
+        start: PooledFit,
         effects: tuple[FittedEffect, ...],
         shape_evidence: tuple[float, ...],
         promise: float,
@@ -378,7 +378,7 @@ class Search:
 
     def _node(
         self,
-        fitted: Fit,
+        fitted: PooledFit,
         causes: tuple[str, ...],
         shape_evidence: tuple[float, ...],
         beside: FloatArray | None = None,
@@ -459,7 +459,8 @@ class Search:
             problem=self.problem,
             columns=tuple(self._columns),
             refits=self.refits,
-            isolability={
+            isolability=self._screened_isolability()
+            | {
                 slug: max(shares[slug] for shares in isolabilities.values() if slug in shares)
                 for slug in {slug for shares in isolabilities.values() for slug in shares}
             },
@@ -476,31 +477,42 @@ class Search:
             for alternative, nodes in self.nodes.items()
         }
 
+    def _screened_isolability(self) -> dict[str, float]:
+        """ι of each effect that was screened, by slug, in the shape that the data like best where nothing is at work."""
+        screened = self.null.evidence.screened
+        best = {slug: kinds[0].column for slug, kinds in starts(self._columns, screened).items()}
+        places = [next(k for k, column in enumerate(self._columns) if column is one) for one in best.values()]
+        sizes = max(screened, key=lambda projected: projected.evidence).sizes
+        shares = isolability(self._null_problem, self.null.fit, self._changes[:, places], sizes)
+        return dict(zip(best, np.clip(shares, 0.0, 1.0).tolist(), strict=True))
+
     def _isolable(
         self, weights: Mapping[Alternative, float], isolabilities: Mapping[Alternative, Mapping[str, float]]
     ) -> tuple[dict[Alternative, float], dict[str, float]]:
         """The weights where a cause of which less than ISOLABLE is left beside the law's discrepancy is the law's: its
-        explanation counts as the same without it. And the probability of each such cause. ι is that in the explanation, or
-        where that was not refitted that of the cause alone."""
+        explanation counts as the same without it, the least isolable first, and what is then left by its own ι. And the
+        probability of each such cause. An explanation that was not refitted has the ι of its causes alone."""
         total = log_sum(list(weights.values()))
         merged: dict[Alternative, float] = {}
         like_the_law: dict[str, float] = {}
         for alternative, weight in weights.items():
             left = alternative
-            for slug in (
-                *alternative.causes,
-                *((alternative.unknown,) if alternative.unknown in FAULT_BY_SLUG else ()),
-            ):
-                alone = NOTHING.and_effect(slug) or NOTHING
-                shares = isolabilities.get(alternative) or isolabilities.get(alone, {})
-                if shares.get(slug, 1.0) < criteria.ISOLABLE:
-                    left = left.without(slug)
-                    like_the_law[slug] = like_the_law.get(slug, 0.0) + float(np.exp(weight - total))
+            while left.named:
+                refitted = isolabilities.get(left)
+                shares = [
+                    ((refitted or isolabilities.get(NOTHING.and_effect(slug) or NOTHING, {})).get(slug, 1.0), slug)
+                    for slug in left.named
+                ]
+                share, least = min(shares)
+                if share >= criteria.ISOLABLE:
+                    break
+                left = left.without(least)
+                like_the_law[least] = like_the_law.get(least, 0.0) + float(np.exp(weight - total))
             merged[left] = float(np.logaddexp(merged.get(left, -np.inf), weight))
         return merged, like_the_law
 
 
-def _shown(problem: FitProblem, fitted: Fit, columns: Sequence[Column]) -> tuple[list[Column], FloatArray]:
+def _shown(problem: FitProblem, fitted: PooledFit, columns: Sequence[Column]) -> tuple[list[Column], FloatArray]:
     """The columns of effects that change a reading, with their changes [N, m]: without loops no delay does, without a clock
     no drift along it."""
     changes = columns_at_rows(problem.design, fitted.prediction, columns)
@@ -511,7 +523,7 @@ def _shown(problem: FitProblem, fitted: Fit, columns: Sequence[Column]) -> tuple
 
 def is_vibration(record: RawEvidence) -> bool:
     """Whether a record shows a vibration of the catalogue."""
-    return record.effect in BY_SLUG and BY_SLUG[record.effect].kind is Kind.VIBRATION
+    return record.effect in BY_SLUG and BY_SLUG[record.effect].kind is EffectKind.VIBRATION
 
 
 def posterior_of(baseline: Baseline, raw: Sequence[RawEvidence], without: frozenset[str] = frozenset()) -> Posterior:

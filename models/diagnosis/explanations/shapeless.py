@@ -37,7 +37,7 @@ from models.arrays import FloatArray
 from models.diagnosis import criteria
 from models.diagnosis.design.design import Design
 from models.diagnosis.noise.covariance import Noise, whitened
-from models.diagnosis.pooled_fit.gauss_newton import Fit, fit, refit_beside
+from models.diagnosis.pooled_fit.gauss_newton import PooledFit, fit, refit_beside
 from models.diagnosis.pooled_fit.problem import FitProblem
 from models.diagnosis.pooled_fit.projection import gram_of, left_over, projections_beside, projections_of
 from models.gaussian_evidence import log_gain, log_mean, log_sum
@@ -129,7 +129,7 @@ _SIZES = (0.1, 1.0)
 _BENT_BETWEEN, _LOUD = 4, 5.0
 
 
-def outlying_run(problem: FitProblem, fitted: Fit) -> str:
+def outlying_run(problem: FitProblem, fitted: PooledFit) -> str:
     """A sentence on the run whose error is far larger than the others', or nothing."""
     worst, left = _worst(problem, fitted)
     if worst is None:
@@ -144,7 +144,7 @@ def outlying_run(problem: FitProblem, fitted: Fit) -> str:
     )
 
 
-def outlier_evidence(problem: FitProblem, fitted: Fit) -> float:
+def outlier_evidence(problem: FitProblem, fitted: PooledFit) -> float:
     """The formula above, of the run whose error is far larger than the others'; -inf where there is none."""
     worst, left = _worst(problem, fitted)
     if worst is None:
@@ -175,7 +175,7 @@ def _own_curve(design: Design, here: NDArray[np.bool_]) -> FloatArray:
     return np.where(here, design.usual_torque, 0.0)[:, None] * waves[-1]
 
 
-def _worst(problem: FitProblem, fitted: Fit) -> tuple[int | None, FloatArray]:
+def _worst(problem: FitProblem, fitted: PooledFit) -> tuple[int | None, FloatArray]:
     """The run whose error is far larger than the others', if one is, and the error [N] Nm without what gains and the law
     make of it. Where a run is so far off that the fit is bent between all of them, it is the one without which the others
     fit."""
@@ -212,7 +212,7 @@ def _left_out(problem: FitProblem, run: int) -> FitProblem:
     return problem.with_noise(replace(problem.noise, deviation=deviation))
 
 
-def temperature_evidence(problem: FitProblem, fitted: Fit) -> float:
+def temperature_evidence(problem: FitProblem, fitted: PooledFit) -> float:
     """Evidence [nats] of unmeasured courses of oil temperature over none."""
     columns, between, within = _courses(problem.design, fitted)
     gram = gram_of(problem, fitted, columns)
@@ -224,7 +224,7 @@ def temperature_evidence(problem: FitProblem, fitted: Fit) -> float:
     return log_sum(gained) - log_sum([projected.evidence for projected in projections])
 
 
-def _courses(design: Design, fitted: Fit) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _courses(design: Design, fitted: PooledFit) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Columns [N, m] of torque and their relative deviations [m] from test to test and within a test."""
     viscous = fitted.prediction.change_at_rows(design, fitted.prediction.scene.viscous, before_lag=True)
     columns, relative = [], []

@@ -23,7 +23,7 @@ from models.diagnosis.effects.fitted_effect import Draw, FittedEffect
 from models.diagnosis.explanations.amplitude_posterior import Proportional
 from models.diagnosis.explanations.evidence import evidence_of, off_by, template_errors
 from models.diagnosis.explanations.verdict import Judgement
-from models.diagnosis.pooled_fit.gauss_newton import Fit, fit
+from models.diagnosis.pooled_fit.gauss_newton import PooledFit, fit
 from models.diagnosis.pooled_fit.problem import FitProblem
 from models.diagnosis.pooled_fit.projection import Gram, Projected, Reduced, gram_of, projections_beside
 from models.gaussian_evidence import log_sum
@@ -57,7 +57,7 @@ class _Component:
     """A refit with its weight."""
 
     weight: float
-    fit: Fit
+    fit: PooledFit
     mean: FloatArray  # of (amplitude, smooth shapes) of each effect, then their b
     root: FloatArray  # of the covariance
     trend: tuple[float, FloatArray]  # what a draw changes between the first state and the last, and its derivatives
@@ -127,7 +127,7 @@ def sizes_of(problem: FitProblem, judgement: Judgement, rng: np.random.Generator
     )
 
 
-def _shares(judgement: Judgement) -> list[tuple[Fit, float]]:
+def _shares(judgement: Judgement) -> list[tuple[PooledFit, float]]:
     """The fitted explanations that stand with their probabilities, which sum to one at most. What holds one of them and
     something beside it that does not stand counts as the largest that it holds."""
     shares = [0.0] * len(judgement.stand)
@@ -150,7 +150,9 @@ def _size(sizes: FloatArray) -> Size:
     )
 
 
-def _components(problem: FitProblem, original: Fit, share: float, rng: np.random.Generator) -> Iterator[_Component]:
+def _components(
+    problem: FitProblem, original: PooledFit, share: float, rng: np.random.Generator
+) -> Iterator[_Component]:
     """A fit's effects refitted under each of their courses, weighed by evidence; as they were found where they have none."""
     # a prior that is nearly flat in a size's logarithm: that the effect is at work is decided already
     flat = [replace(e.effect, tails=min(e.effect.tails, criteria.SIZE_TAILS)) for e in original.effects]
@@ -166,7 +168,7 @@ def _components(problem: FitProblem, original: Fit, share: float, rng: np.random
             yield from _components_of(problem, fitted, weight, rng)
 
 
-def _courses(problem: FitProblem, fitted: Fit) -> Iterator[tuple[float, Fit]]:
+def _courses(problem: FitProblem, fitted: PooledFit) -> Iterator[tuple[float, PooledFit]]:
     """Log weight [nats] and refit of every course that counts. Of each kind the course most like the fitted one is refitted
     first, and then its neighbours as long as they count."""
     best = -np.inf
@@ -206,7 +208,7 @@ def _with_free(shape: tuple[float, ...], fitted: FittedEffect) -> tuple[float, .
     return tuple(was if parameter.smooth and not parameter.held else value for value, was, parameter in own)
 
 
-def _most_alike(fitted: Fit, effect: FittedEffect, kind: Sequence[Tried]) -> int:
+def _most_alike(fitted: PooledFit, effect: FittedEffect, kind: Sequence[Tried]) -> int:
     """Which of the courses changes torque most like an effect as it is fitted."""
     scene = fitted.prediction.scene
     change = effect.effect.change(scene, effect.amplitude, effect.shape)
@@ -229,7 +231,9 @@ def _that_count(whole: Gram, gram: Gram, problem: FitProblem) -> Iterator[Projec
             yield reduced[gains].beside_law(projected.sizes, projected.log_weight)
 
 
-def _components_of(problem: FitProblem, fitted: Fit, weight: float, rng: np.random.Generator) -> Iterator[_Component]:
+def _components_of(
+    problem: FitProblem, fitted: PooledFit, weight: float, rng: np.random.Generator
+) -> Iterator[_Component]:
     """A refit's components: one for each scatter of the gains, size of the law and size of the templates' errors that
     counts."""
     design, free = problem.design, int(problem.priors.free.sum())

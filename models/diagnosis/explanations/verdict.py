@@ -13,7 +13,7 @@ import numpy as np
 from models.diagnosis.design.design import CLOCK, CYCLES, FREQUENCY
 from models.diagnosis.effects.faults import FAULT_BY_SLUG
 from models.diagnosis.effects.fitted_effect import FittedEffect
-from models.diagnosis.pooled_fit.gauss_newton import Fit
+from models.diagnosis.pooled_fit.gauss_newton import PooledFit
 from models.diagnosis.raw_records.evidence import FIXED_LINE
 
 #: A line over the tests' clock; lines, with the axes on which they lie. One run that is not like the others.
@@ -29,6 +29,11 @@ class Alternative(NamedTuple):
 
     causes: tuple[str, ...] = ()
     unknown: str = ""
+
+    @property
+    def named(self) -> tuple[str, ...]:
+        """All that has a name, an uncatalogued fault too."""
+        return (*self.causes, *((self.unknown,) if self.unknown in FAULT_BY_SLUG else ()))
 
     def and_effect(self, slug: str) -> "Alternative | None":
         """With one thing more, a cause or an uncatalogued fault; None where that is not on the list."""
@@ -109,7 +114,7 @@ class Fitted:
     """Causes that were fitted together."""
 
     slugs: tuple[str, ...]  # in the order of the fit's effects
-    fit: Fit
+    fit: PooledFit
     evidence: float  # [nats] over nothing
 
 

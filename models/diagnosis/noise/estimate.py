@@ -37,7 +37,7 @@ _LONGEST, _SHORT = 120, 15
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Piece:
+class ResidualPiece:
     """Rows [n] of one curve or loop, and the contrasts [n, k], orthonormal, that are free of anything smooth. Pieces of one
     length (loops: of the same phases) share one array of contrasts."""
 
@@ -59,12 +59,12 @@ def owners(design: Design) -> IntArray:
     return np.asarray(np.where(design.rows.steady, design.curve, loops), dtype=np.intp)
 
 
-def pieces_across_curves(design: Design, part: NDArray[np.bool_]) -> list[Piece]:
+def pieces_across_curves(design: Design, part: NDArray[np.bool_]) -> list[ResidualPiece]:
     """Where curves have too few speeds, the same speed over the pressures of a run, among the rows of `part` [N]; with too
     few pressures as well the same point from state to state, where what scatters from run to run counts for noise."""
     indices, rows = np.flatnonzero(part), design.rows
     speed = np.round(rows.velocity / max(float(rows.velocity.max()), 1e-300), 2)
-    pieces = list[Piece]()
+    pieces = list[ResidualPiece]()
     for across, fixed, degree in (
         (rows.pressure, rows.run, 2),
         (rows.cycles, design.level, criteria.SMOOTH_DEGREE),
@@ -77,7 +77,7 @@ def pieces_across_curves(design: Design, part: NDArray[np.bool_]) -> list[Piece]
 
 def _pieces(
     design: Design, indices: IntArray, owner: IntArray, longest: int, degree: int = criteria.SMOOTH_DEGREE
-) -> list[Piece]:
+) -> list[ResidualPiece]:
     pieces = []
     order = indices[np.argsort(owner[indices], kind="stable")]
     edges = np.flatnonzero(np.diff(owner[order])) + 1
@@ -96,11 +96,11 @@ def _pieces(
                     angles = np.arange(1, criteria.SMOOTH_HARMONICS + 1) * phase[:, None]
                     smooth = np.column_stack([np.ones_like(phase), np.cos(angles), np.sin(angles)])
                 cache[key] = np.linalg.qr(smooth, mode="complete")[0][:, smooth.shape[1] :]
-            pieces.append(Piece(rows=piece, contrasts=cache[key]))
+            pieces.append(ResidualPiece(rows=piece, contrasts=cache[key]))
     return pieces
 
 
-def calm_pieces(design: Design, part: NDArray[np.bool_], residual: FloatArray) -> list[Piece]:
+def calm_pieces(design: Design, part: NDArray[np.bool_], residual: FloatArray) -> list[ResidualPiece]:
     """The pieces of `part` [N] whose remainder of residual [N] Nm is noise: whole curves, unless short pieces typically show
     less than a SHARP-th of their mean square; then those short ones that show less than SHARP times what is typical."""
     rows, owner = np.flatnonzero(part), owners(design)
@@ -122,7 +122,7 @@ _SHARES = (0.15, 0.3, 0.5, 0.75, 1.0)
 
 
 def estimate_correlation(
-    pieces: Sequence[Piece],
+    pieces: Sequence[ResidualPiece],
     residual: FloatArray,
     deviation: FloatArray,
     from_samples: tuple[float, float] | None,
@@ -250,11 +250,13 @@ def unlike(design: Design, residual: FloatArray, torque: FloatArray) -> FloatArr
     return out
 
 
-def _free(pieces: Sequence[Piece]) -> int:
+def _free(pieces: Sequence[ResidualPiece]) -> int:
     return sum(piece.contrasts.shape[1] for piece in pieces)
 
 
-def _variance(pieces: Sequence[Piece], residual: FloatArray, torque: FloatArray, samples: FloatArray) -> FloatArray:
+def _variance(
+    pieces: Sequence[ResidualPiece], residual: FloatArray, torque: FloatArray, samples: FloatArray
+) -> FloatArray:
     """(a² + b² M²)/n [N] by iterated non-negative least squares on squared remainders, spikes cut."""
     rows = np.concatenate([piece.rows for piece in pieces])
     remainder = np.concatenate([piece.remainder(residual) for piece in pieces])

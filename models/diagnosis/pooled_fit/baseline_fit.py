@@ -36,7 +36,7 @@ from models.diagnosis.baseline.laws import (
 from models.diagnosis.baseline.prediction import frame_of
 from models.diagnosis.design.design import Design
 from models.diagnosis.noise.estimate import estimate_noise, first_noise
-from models.diagnosis.pooled_fit.gauss_newton import STEPS, Fit, FitStatus, fit
+from models.diagnosis.pooled_fit.gauss_newton import STEPS, FitStatus, PooledFit, fit
 from models.diagnosis.pooled_fit.problem import FitProblem, LawTerms, priors_of
 from models.diagnosis.pooled_fit.projection import (
     GAINS,
@@ -172,8 +172,8 @@ class Baseline:
     exact under the same noise, and notes for the report."""
 
     problem: FitProblem
-    fit: Fit
-    exact: Fit
+    fit: PooledFit
+    exact: PooledFit
     notes: tuple[str, ...]
 
 
@@ -203,7 +203,7 @@ def fit_baseline(design: Design) -> Baseline:
     return _with_its_noise(problem, _best_of(problem, (first.laws, second.laws), STEPS))
 
 
-def _with_its_noise(problem: FitProblem, fitted: Fit) -> Baseline:
+def _with_its_noise(problem: FitProblem, fitted: PooledFit) -> Baseline:
     """A fit followed to its end under the noise that its residuals show."""
     noise, assumed = estimate_noise(problem.design, fitted.residual, fitted.torque, problem.noise)
     problem = replace(problem, noise=noise, fitted=fitted.torque)
@@ -233,7 +233,7 @@ def _with_its_noise(problem: FitProblem, fitted: Fit) -> Baseline:
     return Baseline(problem=problem, fit=fitted, exact=exact, notes=_notes(problem.design, assumed))
 
 
-def _with_law(problem: FitProblem, fitted: Fit, laws: Laws) -> FitProblem:
+def _with_law(problem: FitProblem, fitted: PooledFit, laws: Laws) -> FitProblem:
     """The problem with the discrepancy of laws, whose form moves with V_S or does not: the likelier one."""
     either = [law_discrepancy(problem.design, laws, moving=moving) for moving in (False, True)]
     laws_tried = {one.form: one for one in either}.values()  # one where V_S is anything
@@ -253,7 +253,7 @@ def _lagging_as(laws: Laws, other: Laws) -> Laws:
     return replace(laws, theta=theta)
 
 
-def _require_weights(problem: FitProblem, fitted: Fit) -> None:
+def _require_weights(problem: FitProblem, fitted: PooledFit) -> None:
     """Raise IndeterminateError where there is nothing that models could be weighed by."""
     design, deviation = problem.design, problem.noise.deviation
     finite = fitted.status is not FitStatus.NOT_FINITE
@@ -271,7 +271,7 @@ def _require_weights(problem: FitProblem, fitted: Fit) -> None:
         )
 
 
-def _best_of(problem: FitProblem, starts: Sequence[Laws], steps: int) -> Fit:
+def _best_of(problem: FitProblem, starts: Sequence[Laws], steps: int) -> PooledFit:
     return min((fit(problem, laws, steps=steps) for laws in starts), key=lambda fitted: fitted.cost)
 
 

@@ -39,7 +39,7 @@ class FitStatus(StrEnum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Fit:
+class PooledFit:
     """A fitted model."""
 
     laws: Laws
@@ -56,7 +56,7 @@ class Fit:
         return any(effect.wrong_sign for effect in self.effects)
 
 
-def fit(problem: FitProblem, start: Laws, effects: Sequence[FittedEffect] = (), *, steps: int = STEPS) -> Fit:
+def fit(problem: FitProblem, start: Laws, effects: Sequence[FittedEffect] = (), *, steps: int = STEPS) -> PooledFit:
     """Minimise the cost from a start, effects included; `steps` at most.
 
     Gains are taken along one torque (`FitProblem.gained`), which keeps the metric fixed while a fit moves.
@@ -96,7 +96,7 @@ def fit(problem: FitProblem, start: Laws, effects: Sequence[FittedEffect] = (), 
     return replace(state, status=status if np.isfinite(state.cost) else FitStatus.NOT_FINITE)
 
 
-def _inside(state: Fit, priors: Priors, matrix: FloatArray, gradient: FloatArray) -> FloatArray:
+def _inside(state: PooledFit, priors: Priors, matrix: FloatArray, gradient: FloatArray) -> FloatArray:
     """The step [m] that matrix · step = gradient asks for; what is at a bound beyond which it would lead is held there."""
     step = np.asarray(np.linalg.solve(matrix, gradient), dtype=np.float64)
     at, at_bound = int(priors.free.sum()), np.zeros(step.size, dtype=np.bool_)
@@ -113,7 +113,7 @@ def _inside(state: Fit, priors: Priors, matrix: FloatArray, gradient: FloatArray
     return step
 
 
-def _evaluated(problem: FitProblem, metric: Products, laws: Laws, effects: tuple[FittedEffect, ...]) -> Fit:
+def _evaluated(problem: FitProblem, metric: Products, laws: Laws, effects: tuple[FittedEffect, ...]) -> PooledFit:
     design, priors = problem.design, problem.priors
     with np.errstate(over="ignore", invalid="ignore"):  # a step too far: its cost is infinite, and it is not taken
         prediction = predict(design, laws)
@@ -126,7 +126,7 @@ def _evaluated(problem: FitProblem, metric: Products, laws: Laws, effects: tuple
             cost = 0.5 * float(metric(residual[:, None])[0, 0])
             cost += 0.5 * float(((priors.rows @ laws.theta - priors.means) ** 2).sum())
             cost = sum((effect.effect.amplitude_cost(effect.amplitude) for effect in effects), cost)
-    return Fit(
+    return PooledFit(
         laws=laws,
         prediction=prediction,
         torque=torque,
@@ -137,7 +137,7 @@ def _evaluated(problem: FitProblem, metric: Products, laws: Laws, effects: tuple
     )
 
 
-def sensitivities(problem: FitProblem, fitted: Fit) -> FloatArray:
+def sensitivities(problem: FitProblem, fitted: PooledFit) -> FloatArray:
     """∂torque/∂(free θ, then amplitude and smooth shapes of each effect) [N, m]."""
     design, prediction = problem.design, fitted.prediction
     of_effects = [effect.columns(design, prediction) for effect in fitted.effects]
@@ -145,7 +145,7 @@ def sensitivities(problem: FitProblem, fitted: Fit) -> FloatArray:
     return np.concatenate([of_laws, *of_effects], axis=1)
 
 
-def prior_gram(priors: Priors, fitted: Fit) -> FloatArray:
+def prior_gram(priors: Priors, fitted: PooledFit) -> FloatArray:
     """What priors add [m + 1, m + 1] to the Gram matrix of (sensitivities, residual)."""
     rows, off = priors.rows[:, priors.free], priors.means - priors.rows @ fitted.laws.theta
     free, own = rows.shape[1], [effect.precisions for effect in fitted.effects]
@@ -162,7 +162,7 @@ def prior_gram(priors: Priors, fitted: Fit) -> FloatArray:
     return gram
 
 
-def _normal(problem: FitProblem, metric: Products, state: Fit) -> tuple[FloatArray, FloatArray]:
+def _normal(problem: FitProblem, metric: Products, state: PooledFit) -> tuple[FloatArray, FloatArray]:
     """Gram matrix and gradient over the free θ and the effects' parameters."""
     whole = metric(np.column_stack([sensitivities(problem, state), state.residual])) + prior_gram(problem.priors, state)
     gram, gradient = whole[:-1, :-1], whole[:-1, -1]
@@ -171,7 +171,7 @@ def _normal(problem: FitProblem, metric: Products, state: Fit) -> tuple[FloatArr
     return gram, gradient
 
 
-def _moved(state: Fit, priors: Priors, step: FloatArray) -> tuple[Laws, tuple[FittedEffect, ...]] | None:
+def _moved(state: PooledFit, priors: Priors, step: FloatArray) -> tuple[Laws, tuple[FittedEffect, ...]] | None:
     """The state after a step, shapes kept inside their bounds; logarithms move by a limited amount."""
     if not np.isfinite(step).all():
         return None
@@ -202,7 +202,7 @@ def _moved(state: Fit, priors: Priors, step: FloatArray) -> tuple[Laws, tuple[Fi
 REFIT_STEPS = 40
 
 
-def refit(problem: FitProblem, laws: Laws, effects: tuple[FittedEffect, ...]) -> Fit | None:
+def refit(problem: FitProblem, laws: Laws, effects: tuple[FittedEffect, ...]) -> PooledFit | None:
     """The fit from laws and effects; None where a one-sided effect is negative or nothing finite fits."""
     if any(effect.wrong_sign for effect in effects):
         return None
@@ -246,7 +246,7 @@ def _upright(laws: Laws) -> Laws:
     return turned
 
 
-def refit_beside(problem: FitProblem, start: Fit, pattern: FloatArray) -> Fit | None:
+def refit_beside(problem: FitProblem, start: PooledFit, pattern: FloatArray) -> PooledFit | None:
     """The fit where a pattern [N] Nm of the rows is taken off what was measured, as a fit to what was measured: the baseline
     moves to where it leaves that pattern."""
     design = problem.design

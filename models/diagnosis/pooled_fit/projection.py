@@ -36,7 +36,7 @@ from models.diagnosis import criteria
 from models.diagnosis.baseline.law_discrepancy import LawDiscrepancy, sizes_considered
 from models.diagnosis.baseline.law_form import EXACT, LawSizes, LearnedLaw
 from models.diagnosis.noise.covariance import Noise, gains_of, scatter_root, whitened
-from models.diagnosis.pooled_fit.gauss_newton import Fit, prior_gram, sensitivities
+from models.diagnosis.pooled_fit.gauss_newton import PooledFit, prior_gram, sensitivities
 from models.diagnosis.pooled_fit.problem import FitProblem
 from models.gaussian_evidence import independent, log_sum
 
@@ -134,7 +134,7 @@ class _Factored:
 
 def gram_of(
     problem: FitProblem,
-    fit: Fit,
+    fit: PooledFit,
     changes: FloatArray | None = None,
     *,
     screened: FloatArray | None = None,
@@ -323,7 +323,7 @@ def project(gram: Gram, run_gain: float, curve_gain: float, sizes: LawSizes = EX
     return gram.reduced(run_gain, curve_gain).beside_law(sizes)
 
 
-def isolability(problem: FitProblem, fit: Fit, changes: FloatArray, sizes: LawSizes) -> FloatArray:
+def isolability(problem: FitProblem, fit: PooledFit, changes: FloatArray, sizes: LawSizes) -> FloatArray:
     """ι [m] of changes [N, m] beside the law's sizes, at the noise's scatter of the gains."""
     reduced = gram_of(problem, fit, screened=changes).reduced(problem.noise.run_gain, problem.noise.curve_gain)
     beside, exact = (reduced.beside_law(size).screened for size in (sizes, EXACT))
@@ -339,7 +339,7 @@ def log_gain_prior(run_gain: float) -> float:
     return -0.5 * (off / (criteria.GAIN_SD_BELOW if off < 0 else criteria.GAIN_SD_ABOVE)) ** 2
 
 
-def amplitude_deviations(problem: FitProblem, fitted: Fit) -> list[float]:
+def amplitude_deviations(problem: FitProblem, fitted: PooledFit) -> list[float]:
     """Standard deviations of the amplitudes of the fit's effects, everything else free."""
     inverse = gram_of(problem, fitted, exact=False).covariance(problem.noise)
     sizes = [0, *(effect.precisions.size for effect in fitted.effects[:-1])]
@@ -377,7 +377,7 @@ def run_scatter(projections: Sequence[Projected]) -> RunScatter:
     return RunScatter(median=median, lower=lower, upper=upper, information=information)
 
 
-def without_likely_gains(problem: FitProblem, fitted: Fit) -> FloatArray:
+def without_likely_gains(problem: FitProblem, fitted: PooledFit) -> FloatArray:
     """The residual [N] Nm less what the likeliest gains of runs and curves make of it: r - M ĝ with the best linear
     prediction ĝ = K Mᵀ V⁻¹ r, the law taken for exact."""
     noise = problem.noise
@@ -389,7 +389,7 @@ def without_likely_gains(problem: FitProblem, fitted: Fit) -> FloatArray:
     return np.asarray(fitted.residual - fitted.torque * likeliest.ravel()[gains.curve], dtype=np.float64)
 
 
-def learned_law(problem: FitProblem, fitted: Fit) -> LearnedLaw | None:
+def learned_law(problem: FitProblem, fitted: PooledFit) -> LearnedLaw | None:
     """The likeliest discrepancy of the law in a fit's residual r, at the noise's sizes: T (1 + Bᵀ B)⁻¹ Bᵀ V^{-1/2} r with B
     the columns C T whitened beside noise and gains; None where the law is exact."""
     if problem.law is None or problem.noise.law == EXACT:
@@ -401,7 +401,7 @@ def learned_law(problem: FitProblem, fitted: Fit) -> LearnedLaw | None:
     return LearnedLaw(form=problem.law.discrepancy.form, coefficients=deviations * coefficients)
 
 
-def law_torque(problem: FitProblem, fitted: Fit) -> FloatArray:
+def law_torque(problem: FitProblem, fitted: PooledFit) -> FloatArray:
     """The likeliest discrepancy of the law [N] Nm at the rows."""
     learned = learned_law(problem, fitted)
     if learned is None or problem.law is None:
@@ -409,6 +409,6 @@ def law_torque(problem: FitProblem, fitted: Fit) -> FloatArray:
     return np.asarray(problem.law.columns @ learned.coefficients, dtype=np.float64)
 
 
-def left_over(problem: FitProblem, fitted: Fit) -> FloatArray:
+def left_over(problem: FitProblem, fitted: PooledFit) -> FloatArray:
     """The residual [N] Nm less what the likeliest discrepancy of the law and the likeliest gains make of it."""
     return without_likely_gains(problem, replace(fitted, residual=fitted.residual - law_torque(problem, fitted)))

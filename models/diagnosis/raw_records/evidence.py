@@ -22,7 +22,7 @@ import numpy as np
 from models.diagnosis import criteria
 from models.diagnosis.campaign import Campaign, DynamicRun, StationaryRun
 from models.diagnosis.effects.catalogue import CATALOGUE
-from models.diagnosis.effects.fitted_effect import Estimate
+from models.diagnosis.effects.fitted_effect import AmplitudeEstimate
 from models.diagnosis.effects.moving import SHAFT_RIPPLE, STICK_SLIP
 from models.diagnosis.effects.readings import UNSETTLED_DWELL
 from models.diagnosis.raw_records.settling_transient import settling_evidence
@@ -47,7 +47,7 @@ class RawEvidence:
 
     effect: str
     log_evidence: float
-    estimate: Estimate
+    estimate: AmplitudeEstimate
     note: str
 
 
@@ -115,7 +115,7 @@ def _fixed_line(records: list[WhitenedRecord], order: Line | None) -> tuple[Line
 def _line_evidence(effect: str, line: Line, name: str, note: str) -> RawEvidence:
     # λ goes with A², so log L near its maximum has a curvature of about 4 log L / A²
     deviation = line.amplitude / max(2.0 * math.sqrt(max(line.peak, 0.0)), 1.0)
-    estimate = Estimate(name=name, value=line.amplitude, sd=deviation, unit="Nm", one_sided=True)
+    estimate = AmplitudeEstimate(name=name, value=line.amplitude, sd=deviation, unit="Nm", one_sided=True)
     return RawEvidence(effect=effect, log_evidence=line.evidence, estimate=estimate, note=note)
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.special import logsumexp
 
 from models.arrays import FloatArray
-from models.diagnosis.effects.fitted_effect import Estimate
+from models.diagnosis.effects.fitted_effect import AmplitudeEstimate
 from models.gaussian_evidence import log_gain_alone, log_positive
 from models.records.plateaus import PlateauCut
 from models.records.runs import Record
@@ -26,7 +26,7 @@ _FAST_TIMES, _SLOW_TIMES = (0.1, 0.25), (0.8, 1.3, 2.0, 3.2, 5.0)
 _USUAL_SHARE = 0.2
 
 
-def settling_evidence(dwells: Iterable[tuple[Record, PlateauCut]]) -> tuple[float, Estimate]:
+def settling_evidence(dwells: Iterable[tuple[Record, PlateauCut]]) -> tuple[float, AmplitudeEstimate]:
     """Evidence [nats] of slow settling transients over none, by all dwells together, and their time constant τ [s]."""
     times = np.array([*_FAST_TIMES, *_SLOW_TIMES])
     gram, along = np.zeros((times.size, times.size)), np.zeros(times.size)
@@ -54,7 +54,7 @@ def settling_evidence(dwells: Iterable[tuple[Record, PlateauCut]]) -> tuple[floa
     weights, log_times = np.exp(logs - logsumexp(logs)), np.log(_SLOW_TIMES)
     middle = float(weights @ log_times)
     within = np.ptp(log_times) / (log_times.size - 1) / np.sqrt(12)  # the grid cannot tell τ closer than its spacing
-    return float(logsumexp(logs) - np.log(len(_SLOW_TIMES))), Estimate(
+    return float(logsumexp(logs) - np.log(len(_SLOW_TIMES))), AmplitudeEstimate(
         name="settling time constant",
         value=float(np.exp(middle)),
         sd=float(np.exp(middle) * np.sqrt(weights @ (log_times - middle) ** 2 + within**2)),

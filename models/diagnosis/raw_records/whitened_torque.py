@@ -36,7 +36,7 @@ REVERSES = 0.03
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Piece:
+class RecordPiece:
     """Consecutive samples [n]: time [s], speed [rad/s], torque [Nm]."""
 
     time: FloatArray
@@ -44,7 +44,7 @@ class Piece:
     torque: FloatArray
 
 
-def pieces_of(record: Record, spans: FloatArray | None, period: float, count: int) -> list[Piece]:
+def pieces_of(record: Record, spans: FloatArray | None, period: float, count: int) -> list[RecordPiece]:
     """The pieces of a record with a sample every `period` [s], means of `count` samples each; within spans [k, 2] s where
     they are given, else where its pressure is constant."""
     turned = round(1.0 / period)  # torque has settled 1 s after
@@ -95,13 +95,13 @@ def _one_direction(speed: FloatArray, first: int, stop: int, turned: int) -> Ite
         yield first + begin + turned, first + end
 
 
-def _averaged(record: Record, first: int, stop: int, count: int) -> Piece:
+def _averaged(record: Record, first: int, stop: int, count: int) -> RecordPiece:
     """The rows [first, stop), means of `count` each."""
     stop = first + (stop - first) // count * count
     time, speed, torque = (channel[first:stop] for channel in (record.time, record.speed, record.torque))
     if count > 1:
         time, speed, torque = (channel.reshape(-1, count).mean(axis=1) for channel in (time, speed, torque))
-    return Piece(time=time, speed=speed, torque=torque)
+    return RecordPiece(time=time, speed=speed, torque=torque)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -163,7 +163,7 @@ def _speed_period(speed: FloatArray, step: float) -> float:
     return float(speed.size * step / max(1, int(power.argmax())))
 
 
-def _whitened(pieces: Sequence[Piece], step: float, between: int, least_variance: float) -> WhitenedRecord | None:
+def _whitened(pieces: Sequence[RecordPiece], step: float, between: int, least_variance: float) -> WhitenedRecord | None:
     """None where noise is too small beside the recorder's steps (its median variance at most `least_variance` [Nm²])."""
     from scipy.signal import lfilter  # start-up time
 

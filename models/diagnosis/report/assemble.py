@@ -11,7 +11,7 @@ from models.diagnosis import criteria
 from models.diagnosis.design.design import Design
 from models.diagnosis.effects.catalogue import BY_SLUG
 from models.diagnosis.effects.effect import FROM_THE_START
-from models.diagnosis.effects.fitted_effect import Draw, Estimate, FittedEffect, ranges_of
+from models.diagnosis.effects.fitted_effect import AmplitudeEstimate, Draw, FittedEffect, ranges_of
 from models.diagnosis.experiments.test_plan import Advice
 from models.diagnosis.explanations.posterior import Posterior
 from models.diagnosis.explanations.shapeless import outlying_run
@@ -19,7 +19,7 @@ from models.diagnosis.explanations.sizes import Size, Sizes
 from models.diagnosis.explanations.verdict import NOTHING, Explanation, Judgement, Verdict
 from models.diagnosis.extension import Extension, build_extension
 from models.diagnosis.pooled_fit.baseline_fit import Baseline
-from models.diagnosis.pooled_fit.gauss_newton import Fit, FitStatus
+from models.diagnosis.pooled_fit.gauss_newton import FitStatus, PooledFit
 from models.diagnosis.pooled_fit.problem import FitProblem
 from models.diagnosis.pooled_fit.projection import RunScatter, amplitude_deviations, run_scatter
 from models.diagnosis.raw_records.evidence import RawEvidence
@@ -84,9 +84,9 @@ def _onset(fitted: FittedEffect) -> str:
     return "" if onset == FROM_THE_START else f"from about {number(onset)} cycles on"
 
 
-def _estimate(slug: str, amplitude: float, deviation: float) -> Estimate:
+def _estimate(slug: str, amplitude: float, deviation: float) -> AmplitudeEstimate:
     effect = BY_SLUG[slug]
-    return Estimate(
+    return AmplitudeEstimate(
         name=effect.amplitude,
         value=_finite(amplitude * effect.scale),
         sd=_finite(deviation * effect.scale),
@@ -158,7 +158,7 @@ def report_of(
     posterior: Posterior,
     judgement: Judgement,
     raw: Sequence[RawEvidence],
-    extended: Fit | None,
+    extended: PooledFit | None,
     gain: Gain | None,
     sizes: Sizes,
     advice: tuple[Advice, ...],
@@ -209,7 +209,7 @@ def report_of(
 
 
 def _extension(
-    problem: FitProblem, fitted: Fit, sizes: Sizes, gain: Gain | None, law: FrictionLaw | None
+    problem: FitProblem, fitted: PooledFit, sizes: Sizes, gain: Gain | None, law: FrictionLaw | None
 ) -> Extension | None:
     """What may be adopted: the causes at work, and the law as found where it is proposed; None without either."""
     learned = law.learned if law is not None and law.adoptable else None

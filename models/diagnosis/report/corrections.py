@@ -3,7 +3,7 @@
 import numpy as np
 
 from models.diagnosis.effects.catalogue import BY_SLUG
-from models.diagnosis.effects.effect import Kind
+from models.diagnosis.effects.effect import EffectKind
 from models.diagnosis.extension import Extension
 from models.diagnosis.report.summary import size_of
 
@@ -14,7 +14,7 @@ def corrections(extension: Extension) -> tuple[str, ...]:
     sentences = []
     for slug in extension.effects:
         effect = BY_SLUG.get(slug)
-        if effect is None or effect.kind is not Kind.ARTEFACT:
+        if effect is None or effect.kind is not EffectKind.ARTEFACT:
             continue
         drawn = [
             (draw["weight"], stored["amplitude"])

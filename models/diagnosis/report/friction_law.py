@@ -16,7 +16,7 @@ import numpy as np
 from models.arrays import FloatArray
 from models.diagnosis import criteria
 from models.diagnosis.baseline.law_form import EXACT, LearnedLaw
-from models.diagnosis.pooled_fit.gauss_newton import Fit, fit, sensitivities
+from models.diagnosis.pooled_fit.gauss_newton import PooledFit, fit, sensitivities
 from models.diagnosis.pooled_fit.problem import FitProblem
 from models.diagnosis.pooled_fit.projection import Gram, Projected, gram_of, law_torque, learned_law, projections_beside
 from models.diagnosis.validation.held_out import FittedModel, Gain, measure_gain
@@ -75,7 +75,7 @@ class FrictionLaw:
         return self.mentioned and gain is not None and gain.log_score_gain > 0.0 and gain.rmse_after <= gain.rmse_before
 
 
-def friction_law_of(problem: FitProblem, fitted: Fit, rng: np.random.Generator) -> FrictionLaw | None:
+def friction_law_of(problem: FitProblem, fitted: PooledFit, rng: np.random.Generator) -> FrictionLaw | None:
     """The discrepancy beside the effects of a fit; None where no plateau shows one."""
     design = problem.design
     rows = np.flatnonzero(design.closed & design.rows.steady)
@@ -146,7 +146,9 @@ def _of_remaining(exact: float, law: float) -> float | None:
     return 100.0 * (remaining[1] / remaining[0] - 1.0)
 
 
-def _curves(problem: FitProblem, alone: Fit, fitted: Fit, drawn: FloatArray, rows: np.ndarray) -> tuple[LawCurve, ...]:
+def _curves(
+    problem: FitProblem, alone: PooledFit, fitted: PooledFit, drawn: FloatArray, rows: np.ndarray
+) -> tuple[LawCurve, ...]:
     """The first and the last state at the lowest and the highest pressure, at the plateaus' own speeds."""
     design = problem.design
     by_law = fitted.torque + law_torque(problem, fitted)

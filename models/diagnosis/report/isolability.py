@@ -32,14 +32,14 @@ from models.arrays import FloatArray
 from models.diagnosis import criteria
 from models.diagnosis.campaign import Campaign
 from models.diagnosis.effects.catalogue import CATALOGUE, Column, columns_at_rows
-from models.diagnosis.effects.effect import SCALES, Kind
+from models.diagnosis.effects.effect import SCALES, EffectKind
 from models.diagnosis.effects.fitted_effect import FittedEffect
 from models.diagnosis.experiments.candidates import TRIALS, runs_of
 from models.diagnosis.experiments.information import CandidateDistances
 from models.diagnosis.experiments.test_plan import bare, distinguished, trials_of
 from models.diagnosis.explanations.posterior import Posterior, screen_of
 from models.diagnosis.explanations.verdict import Alternative
-from models.diagnosis.pooled_fit.gauss_newton import Fit
+from models.diagnosis.pooled_fit.gauss_newton import PooledFit
 from models.diagnosis.pooled_fit.projection import gram_of, project
 from models.diagnosis.raw_records.evidence import RawEvidence
 from models.diagnosis.report.report import Isolability, Pair, Visible
@@ -60,6 +60,7 @@ def visible_of(posterior: Posterior) -> tuple[Visible, ...]:
             least=min(by_shape),
             usual=effects[slug].prior_sd * effects[slug].scale,
             unit=effects[slug].unit,
+            isolability=posterior.isolability[slug],
         )
         for slug, by_shape in sizes.items()
         if np.isfinite(min(by_shape))
@@ -100,7 +101,7 @@ _TIMES_VISIBLE = 2.0
 
 def isolability_of(campaign: Campaign, posterior: Posterior) -> Isolability:
     """Of the catalogue, which could be told from which."""
-    slugs = [effect.slug for effect in CATALOGUE if effect.kind is not Kind.VIBRATION]
+    slugs = [effect.slug for effect in CATALOGUE if effect.kind is not EffectKind.VIBRATION]
     grouped = {
         slug: [(column, float(size)) for column, size in places]
         for slug, places in groupby(
@@ -136,13 +137,15 @@ def isolability_of(campaign: Campaign, posterior: Posterior) -> Isolability:
     )
 
 
-def _with(null: Fit, column: Column, amplitude: float) -> Fit:
+def _with(null: PooledFit, column: Column, amplitude: float) -> PooledFit:
     """The baseline's fit with an effect beside it."""
     amplitude = abs(amplitude) if column.effect.positive else amplitude
     return replace(bare(null), effects=(FittedEffect(effect=column.effect, amplitude=amplitude, shape=column.shape),))
 
 
-def _pair(campaign: Campaign, posterior: Posterior, effects: tuple[str, str], ways: Sequence[tuple[Fit, Fit]]) -> Pair:
+def _pair(
+    campaign: Campaign, posterior: Posterior, effects: tuple[str, str], ways: Sequence[tuple[PooledFit, PooledFit]]
+) -> Pair:
     """Both ways round, with the campaign and with each test beside it."""
     after = dict[str, float]()
     distances = [CandidateDistances(posterior.problem, way) for way in ways]

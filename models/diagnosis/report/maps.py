@@ -8,7 +8,7 @@ import numpy as np
 from models.arrays import FloatArray
 from models.diagnosis.design.design import IntArray
 from models.diagnosis.pooled_fit.baseline_fit import Baseline
-from models.diagnosis.pooled_fit.gauss_newton import Fit
+from models.diagnosis.pooled_fit.gauss_newton import PooledFit
 from models.diagnosis.pooled_fit.problem import FitProblem
 from models.diagnosis.pooled_fit.projection import left_over
 
@@ -44,7 +44,7 @@ class LoopTrace:
     extended: FloatArray
 
 
-def residual_maps(baseline: Baseline, problem: FitProblem, extended: Fit) -> Maps | None:
+def residual_maps(baseline: Baseline, problem: FitProblem, extended: PooledFit) -> Maps | None:
     """Means of residual over noise on plateaus (on loops where there are no plateaus) of the closed clutch, of eq. 3 taken
     for exact and of the extended model beside the law; None without."""
     design, noise = problem.design, problem.noise
@@ -82,7 +82,7 @@ def _means(values: FloatArray, row: IntArray, column: IntArray, shape: tuple[int
     return np.where(count > 0, total / np.maximum(count, 1), np.nan).reshape(shape)
 
 
-def loop_traces(baseline: Baseline, problem: FitProblem, extended: Fit) -> tuple[LoopTrace, ...]:
+def loop_traces(baseline: Baseline, problem: FitProblem, extended: PooledFit) -> tuple[LoopTrace, ...]:
     """A few loops, fresh to worn and low to high pressure: a period's bins, as measured and as both models have it."""
     design = problem.design
     number = design.rows.loop

@@ -15,11 +15,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from models.diagnosis.effects.fitted_effect import Estimate
+from models.diagnosis.effects.fitted_effect import AmplitudeEstimate
 from models.diagnosis.experiments.test_plan import Advice
 from models.diagnosis.explanations.verdict import Explanation, Verdict, Where
 from models.diagnosis.extension import Extension
-from models.diagnosis.pooled_fit.gauss_newton import Fit, FitStatus
+from models.diagnosis.pooled_fit.gauss_newton import FitStatus, PooledFit
 from models.diagnosis.pooled_fit.problem import FitProblem
 from models.diagnosis.pooled_fit.projection import RunScatter, left_over
 from models.diagnosis.report.friction_law import FrictionLaw
@@ -37,7 +37,7 @@ class Misfit:
     where: tuple[Where, ...] = ()
 
 
-def misfit_of(problem: FitProblem, fitted: Fit, where: Sequence[Where] = ()) -> Misfit:
+def misfit_of(problem: FitProblem, fitted: PooledFit, where: Sequence[Where] = ()) -> Misfit:
     """The misfit of a fit: rmse and noise [Nm], the gains and the law's discrepancy (where the problem has one) taken
     out."""
     left = left_over(problem, fitted) / problem.noise.deviation
@@ -59,7 +59,7 @@ class Candidate:
     title: str
     probability: float
     log_evidence_gain: float  # over the baseline [nats]
-    estimate: Estimate
+    estimate: AmplitudeEstimate
     # ι: the share of its information that is left beside the law's discrepancy [-]; None where it was not refitted
     isolability: float | None = None
     beside: tuple[str, ...] = ()  # the effects beside it
@@ -75,6 +75,7 @@ class Visible:
     least: float  # in the shape that shows best
     usual: float
     unit: str
+    isolability: float  # ι: the share of its information that is left beside the law's discrepancy [-]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -13,8 +13,8 @@ import numpy as np
 from models.diagnosis import criteria
 from models.diagnosis.design.design import CLOCK, CYCLES, FREQUENCY, PHASE, PRESSURE, SPEED, TEMPERATURE, TORQUE
 from models.diagnosis.effects.catalogue import BY_SLUG
-from models.diagnosis.effects.effect import Kind
-from models.diagnosis.effects.fitted_effect import Estimate
+from models.diagnosis.effects.effect import EffectKind
+from models.diagnosis.effects.fitted_effect import AmplitudeEstimate
 from models.diagnosis.experiments.candidates import TRIALS
 from models.diagnosis.experiments.test_plan import BASELINE, Advice
 from models.diagnosis.explanations.decide import smallest
@@ -80,7 +80,7 @@ def with_unit(text: str, unit: str) -> str:
     return text if unit in {"-", ""} else f"{text} {unit}"
 
 
-def stated(estimate: Estimate, slug: str) -> str:
+def stated(estimate: AmplitudeEstimate, slug: str) -> str:
     """A sentence on a size with its 90 % interval, and on its sign where that is not sure."""
     effect, (name, _, onset) = BY_SLUG[slug], estimate.name.partition(" (from ")
     if estimate.value == 0.0:  # nothing was fitted
@@ -357,7 +357,7 @@ def _alternative(report: Report, effects: Sequence[str], held: Sequence[str], *,
     return f"{' together with '.join(names) or _ALONE} ({aside})"
 
 
-def _brief_size(estimate: Estimate, slug: str) -> str:
+def _brief_size(estimate: AmplitudeEstimate, slug: str) -> str:
     """A value with its name, without its interval, where it has a unit that one feels and its sign is known."""
     low, high = estimate.interval
     unknown = estimate.value == 0.0 or (low < 0.0 < high and not estimate.one_sided)
@@ -442,8 +442,10 @@ def _adoption(report: Report) -> list[Sentence]:
         return [
             Sentence(f"If that confirms {it}, adopting {it} is of little use: later tests are predicted no better.")
         ]
-    courses = listed([effect_name(slug) for slug in adoptable if BY_SLUG[slug].kind is Kind.COURSE])
-    then = ["measurements are then corrected"] if any(BY_SLUG[s].kind is not Kind.COURSE for s in adoptable) else []
+    courses = listed([effect_name(slug) for slug in adoptable if BY_SLUG[slug].kind is EffectKind.COURSE])
+    then = (
+        ["measurements are then corrected"] if any(BY_SLUG[s].kind is not EffectKind.COURSE for s in adoptable) else []
+    )
     then += [f"the predicted remaining life then includes {courses}"] if courses else []
     better = listed([*then, "later tests are predicted better"])
     return [Sentence(f"If that confirms {it}, adopt {it}: {better}.")]

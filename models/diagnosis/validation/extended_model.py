@@ -21,10 +21,10 @@ from models.arrays import FloatArray
 from models.diagnosis import criteria
 from models.diagnosis.design.design import CLOCK, PHASE, TEMPERATURE, Design, Points
 from models.diagnosis.effects.catalogue import change_columns
-from models.diagnosis.effects.effect import Effect, Kind
+from models.diagnosis.effects.effect import Effect, EffectKind
 from models.diagnosis.effects.fitted_effect import FittedEffect
 from models.diagnosis.explanations.verdict import Judgement, Verdict
-from models.diagnosis.pooled_fit.gauss_newton import Fit, fit
+from models.diagnosis.pooled_fit.gauss_newton import PooledFit, fit
 from models.diagnosis.pooled_fit.problem import FitProblem
 from models.diagnosis.pooled_fit.projection import gram_of, project
 from models.diagnosis.validation.held_out import FittedModel, Gain, measure_gain
@@ -45,7 +45,7 @@ _OF_POINTS: dict[str, Callable[[Points], FloatArray]] = {
 AXES = frozenset({*_OF_POINTS, PHASE})
 
 
-def smooth_fit(problem: FitProblem, baseline: Fit, axes: Sequence[str]) -> Fit | None:
+def smooth_fit(problem: FitProblem, baseline: PooledFit, axes: Sequence[str]) -> PooledFit | None:
     """The baseline refitted with a smooth correction on the axes; None where no axis can carry one."""
     effects = [effect for axis in axes[:2] for effect in _along(problem.design, axis)]
     if not effects:
@@ -90,7 +90,7 @@ def _effect(k: int, column: Callable[[Points], FloatArray], *, before_lag: bool)
     return Effect(
         slug=SLUG,
         title="Structure without a name",
-        kind=Kind.LAG,
+        kind=EffectKind.LAG,
         amplitude="share of the torque",
         unit="-",
         prior_sd=1.0 / (1.0 + k / 3.0),
@@ -100,7 +100,7 @@ def _effect(k: int, column: Callable[[Points], FloatArray], *, before_lag: bool)
     )
 
 
-def _size(problem: FitProblem, baseline: Fit, effects: Sequence[Effect]) -> float:
+def _size(problem: FitProblem, baseline: PooledFit, effects: Sequence[Effect]) -> float:
     """τ of the largest marginal likelihood, in units of the prior's deviations."""
     unit_changes = [(effect.change(baseline.prediction.scene, 1.0, ()), effect.lags(())) for effect in effects]
     gram = gram_of(problem, baseline, change_columns(problem.design, baseline.prediction, unit_changes))
@@ -110,8 +110,8 @@ def _size(problem: FitProblem, baseline: Fit, effects: Sequence[Effect]) -> floa
 
 
 def validate(
-    problem: FitProblem, baseline: Fit, judgement: Judgement, rng: np.random.Generator
-) -> tuple[Fit | None, Gain | None]:
+    problem: FitProblem, baseline: PooledFit, judgement: Judgement, rng: np.random.Generator
+) -> tuple[PooledFit | None, Gain | None]:
     """The baseline extended by the likeliest causes, or by a smooth correction on the axes of unexplained structure (None
     where there is nothing to extend by), and its gain (None where nothing can be held out)."""
     extended = judgement.stand[0].fit if judgement.stand else None

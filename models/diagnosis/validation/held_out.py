@@ -22,7 +22,7 @@ from models.diagnosis.baseline.law_form import EXACT
 from models.diagnosis.baseline.laws import KAPPA, Laws
 from models.diagnosis.design.design import CYCLES, PRESSURE, Design
 from models.diagnosis.noise.covariance import Noise
-from models.diagnosis.pooled_fit.gauss_newton import Fit, fit, prior_gram, sensitivities
+from models.diagnosis.pooled_fit.gauss_newton import PooledFit, fit, prior_gram, sensitivities
 from models.diagnosis.pooled_fit.problem import FitProblem
 from models.diagnosis.pooled_fit.projection import law_torque
 
@@ -72,7 +72,7 @@ class FittedModel:
     """A model that was fitted, and its problem: the law's discrepancy is part of it."""
 
     problem: FitProblem
-    fit: Fit
+    fit: PooledFit
 
 
 def measure_gain(before: FittedModel, after: FittedModel, rng: np.random.Generator) -> Gain | None:

@@ -21,7 +21,7 @@ from models.diagnosis.effects.catalogue import BY_SLUG
 from models.diagnosis.effects.effect import FROM_THE_START, Shape
 from models.diagnosis.effects.fitted_effect import FittedEffect
 from models.diagnosis.pooled_fit.baseline_fit import Baseline, fit_baseline, starting_laws
-from models.diagnosis.pooled_fit.gauss_newton import Fit, fit
+from models.diagnosis.pooled_fit.gauss_newton import PooledFit, fit
 from models.diagnosis.pooled_fit.problem import FitProblem
 from models.diagnosis.report.report import Report
 from models.friction.stribeck import StribeckParameters, torque
@@ -214,7 +214,7 @@ class Study:
     def problem(self) -> FitProblem:
         return self.baseline.problem
 
-    def extended(self, *effects: tuple[str, float, Shape]) -> Fit:
+    def extended(self, *effects: tuple[str, float, Shape]) -> PooledFit:
         """The baseline with effects (slug, first amplitude, shape) fitted along."""
         start = [of_size(slug, first, shape) for slug, first, shape in effects]
         return fit(self.problem, self.baseline.fit.laws, start)

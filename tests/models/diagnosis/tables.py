@@ -4,16 +4,16 @@ Writes them into the document, between their marks.
 """
 
 from models.diagnosis.effects.catalogue import CATALOGUE
-from models.diagnosis.effects.effect import Kind
+from models.diagnosis.effects.effect import EffectKind
 from models.diagnosis.experiments.candidates import TRIALS
 from tests.measuring import APPENDIX, fill, table
 
 #: What an adopted effect does, by its kind.
 ADOPTED = {
-    Kind.ARTEFACT: "artefact: taken off each measurement",
-    Kind.COURSE: "course: followed along the life",
-    Kind.LAG: "loops only: shown, nothing to adopt for a life",
-    Kind.VIBRATION: "raw records only: shown, nothing to adopt for a life",
+    EffectKind.ARTEFACT: "artefact: taken off each measurement",
+    EffectKind.COURSE: "course: followed along the life",
+    EffectKind.LAG: "loops only: shown, nothing to adopt for a life",
+    EffectKind.VIBRATION: "raw records only: shown, nothing to adopt for a life",
 }
 
 

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from models.diagnosis.campaign import Campaign, StationaryRun
-from models.diagnosis.effects.fitted_effect import Estimate
+from models.diagnosis.effects.fitted_effect import AmplitudeEstimate
 from models.diagnosis.experiments.candidates import Step
 from models.diagnosis.experiments.test_plan import Advice
 from models.diagnosis.explanations.verdict import Explanation, Verdict, Where
@@ -68,7 +68,7 @@ def _report(campaign: Campaign, extension: Extension | None) -> Report:
                 title="Zero of the torque sensor",
                 probability=0.98,
                 log_evidence_gain=31.0,
-                estimate=Estimate(name="zero shift", value=SHIFT_NM, sd=float("inf"), unit="Nm"),
+                estimate=AmplitudeEstimate(name="zero shift", value=SHIFT_NM, sd=float("inf"), unit="Nm"),
             ),
         ),
         baseline=Misfit(rmse=0.3, noise=0.25, unexplained_share=0.3, where=where),
@@ -108,7 +108,7 @@ def _report(campaign: Campaign, extension: Extension | None) -> Report:
                 ),
             ),
         ),
-        visible=(Visible(effect="torque_zero_shift", amplitude=0.2, least=0.1, usual=0.5, unit="Nm"),),
+        visible=(Visible(effect="torque_zero_shift", amplitude=0.2, least=0.1, usual=0.5, unit="Nm", isolability=0.9),),
         maps=Maps(
             pressure=np.array([4e5, 5e5]),
             speed=np.array([10.0, 20.0, 30.0]),

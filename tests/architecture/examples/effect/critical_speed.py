@@ -5,7 +5,7 @@ import numpy as np
 from models.arrays import FloatArray
 from models.diagnosis.baseline.laws import Scene
 from models.diagnosis.design.facts import Facts
-from models.diagnosis.effects.effect import Effect, Kind, Measure, Shape, ShapeParameter, Tried
+from models.diagnosis.effects.effect import Effect, EffectKind, Measure, Shape, ShapeParameter, Tried
 
 #: Half the width of the resonance [m/s].
 _WIDTH = 0.8
@@ -27,12 +27,12 @@ CRITICAL_SPEED = Effect(
     physics="Unbalance loads the bearings most at the critical speed: a torque that peaks there, whatever the pressure.",
     formula="a / (1 + ((v - v_c)/w)²), w = 0.8 m/s",
     source="made up for docs/explanation/architecture.md",
-    kind=Kind.ARTEFACT,
+    kind=EffectKind.ARTEFACT,
     channels=(),
     amplitude="torque at the critical speed",
     unit="Nm",
     prior_sd=0.3,
-    positive=True,
+    lowest=0.0,
     scale=1.0,
     shapes=(ShapeParameter(name="critical speed", unit="m/s", lowest=1.0, highest=12.0, smooth=True),),
     grid=_grid,

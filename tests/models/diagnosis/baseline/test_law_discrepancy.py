@@ -16,7 +16,7 @@ from models.diagnosis.design.autocorrelation import Correlation
 from models.diagnosis.effects.catalogue import BY_SLUG, CATALOGUE, RETIRED, effects_for
 from models.diagnosis.explanations.posterior import posterior_of
 from models.diagnosis.explanations.verdict import Verdict
-from models.diagnosis.pooled_fit.gauss_newton import Fit, prior_gram, sensitivities
+from models.diagnosis.pooled_fit.gauss_newton import PooledFit, prior_gram, sensitivities
 from models.diagnosis.pooled_fit.problem import FitProblem
 from models.diagnosis.pooled_fit.projection import (
     gram_of,
@@ -123,7 +123,7 @@ def problem(given: Study) -> FitProblem:
 
 
 @pytest.fixture(scope="module")
-def fitted(given: Study, problem: FitProblem) -> Fit:
+def fitted(given: Study, problem: FitProblem) -> PooledFit:
     """With a residual that noise and the law have made."""
     law = problem.law
     assert law is not None
@@ -171,7 +171,9 @@ def test_products_beside_the_law_are_those_of_the_dense_inverse(problem: FitProb
 
 
 @pytest.mark.parametrize("sizes", [EXACT, SIZES, LawSizes(0.02, 0.0, 0.0)])
-def test_what_is_left_beside_the_law_is_the_dense_projection(problem: FitProblem, fitted: Fit, sizes: LawSizes) -> None:
+def test_what_is_left_beside_the_law_is_the_dense_projection(
+    problem: FitProblem, fitted: PooledFit, sizes: LawSizes
+) -> None:
     changes = np.random.default_rng(4).standard_normal((problem.design.torque.size, 2)) * fitted.torque[:, None] * 0.01
     gram = gram_of(problem, fitted, changes, screened=changes)
     reduced = gram.reduced(problem.noise.run_gain, problem.noise.curve_gain)
@@ -213,7 +215,7 @@ def test_with_the_exact_law_all_is_as_without_one(given: Study) -> None:
     assert np.abs(law_torque(given.problem.exact, fitted)).max() == 0.0
 
 
-def test_the_learned_law_is_the_dense_posterior_mean(problem: FitProblem, fitted: Fit) -> None:
+def test_the_learned_law_is_the_dense_posterior_mean(problem: FitProblem, fitted: PooledFit) -> None:
     law = problem.law
     assert law is not None
     deviations = law.discrepancy.form.deviations(SIZES)
@@ -225,7 +227,7 @@ def test_the_learned_law_is_the_dense_posterior_mean(problem: FitProblem, fitted
     np.testing.assert_allclose(law_torque(problem, fitted), law.columns @ expected, atol=1e-4)
 
 
-def test_the_sizes_of_a_law_are_found_again(problem: FitProblem, fitted: Fit) -> None:
+def test_the_sizes_of_a_law_are_found_again(problem: FitProblem, fitted: PooledFit) -> None:
     """Residuals of a form off by 1 % ask for a form that is off, residuals of noise alone for the exact law."""
     reduced = gram_of(problem, fitted).reduced(problem.noise.run_gain, problem.noise.curve_gain)
     kept = likely_sizes(reduced)
@@ -243,7 +245,7 @@ def test_the_sizes_of_a_law_are_found_again(problem: FitProblem, fitted: Fit) ->
 # --- Isolability: the share of what shows a change that is no difference of the law.
 
 
-def test_isolability_is_a_share_and_all_of_it_beside_the_exact_law(problem: FitProblem, fitted: Fit) -> None:
+def test_isolability_is_a_share_and_all_of_it_beside_the_exact_law(problem: FitProblem, fitted: PooledFit) -> None:
     design, law = problem.design, problem.law
     assert law is not None
     wave = law.columns[:, 4]
@@ -261,7 +263,7 @@ def test_isolability_is_a_share_and_all_of_it_beside_the_exact_law(problem: FitP
     np.testing.assert_allclose(isolability(problem, fitted, changes[:, :3], EXACT), 1.0)
 
 
-def test_a_log_density_of_residuals_falls_with_the_sizes_that_made_them(problem: FitProblem, fitted: Fit) -> None:
+def test_a_log_density_of_residuals_falls_with_the_sizes_that_made_them(problem: FitProblem, fitted: PooledFit) -> None:
     """Of the dense normal density itself: sizes that are too small and too large are both less likely than the true ones."""
     logs = [
         multivariate_normal.logpdf(fitted.residual, cov=dense(problem, sizes, problem.gained))

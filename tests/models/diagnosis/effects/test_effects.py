@@ -18,7 +18,7 @@ from models.diagnosis.campaign import Campaign, DutyRun, EventKind, MaintenanceE
 from models.diagnosis.criteria import DISCREPANCY_SD
 from models.diagnosis.design.facts import facts_of
 from models.diagnosis.effects.catalogue import BY_SLUG, CATALOGUE
-from models.diagnosis.effects.effect import Effect, Kind
+from models.diagnosis.effects.effect import Effect, EffectKind
 from models.diagnosis.effects.faults import last_direction
 from models.diagnosis.effects.fitted_effect import FittedEffect, discrepancy_factors, law_columns
 from models.diagnosis.effects.history import BY_CLOCK, BY_USE, STATIC, WHOLE
@@ -59,7 +59,7 @@ def test_no_amplitude_no_change_and_all_changes_are_finite(effect: Effect, scene
         )
         np.testing.assert_allclose(column, one, rtol=1e-9, atol=1e-9 * np.abs(one).max())  # many at once, or each alone
         assert np.abs(column).max() > 0
-        assert effect.kind is not Kind.LAG or np.abs(column[scene.points.steady]).max() == 0
+        assert effect.kind is not EffectKind.LAG or np.abs(column[scene.points.steady]).max() == 0
         # small amplitudes act in proportion
         assert np.abs(two - column)[moving].max() < 0.05 * np.abs(column[moving]).max()
 

@@ -16,7 +16,7 @@ from models.diagnosis.experiments.candidates import OIL_SETTLING, PASSES, TRIALS
 from models.diagnosis.experiments.information import CandidateDistances
 from models.diagnosis.experiments.test_plan import Advice, advise, decided
 from models.diagnosis.explanations.verdict import Fitted
-from models.diagnosis.pooled_fit.gauss_newton import Fit, fit
+from models.diagnosis.pooled_fit.gauss_newton import PooledFit, fit
 from tests.models.diagnosis.campaigns import (
     RPM,
     Study,
@@ -40,7 +40,7 @@ def swung() -> Study:
 
 
 @pytest.fixture(scope="module")
-def rivals(swung: Study) -> tuple[Fit, Fit]:
+def rivals(swung: Study) -> tuple[PooledFit, PooledFit]:
     """Inertia, which is planted, and a film."""
     film = BY_SLUG["squeeze_film"]
     tried = film.grid(swung.design.facts)[0]
@@ -55,7 +55,7 @@ def warm() -> Study:
     return study(campaign(22, warmth, loops=False))
 
 
-def advised(given: Study, *fits: Fit, nearby: tuple[Fit, ...] = ()) -> tuple[Advice, ...]:
+def advised(given: Study, *fits: PooledFit, nearby: tuple[PooledFit, ...] = ()) -> tuple[Advice, ...]:
     credible = [Fitted(slugs=(), fit=fit, evidence=0.0) for fit in fits]
     behind = [Fitted(slugs=(), fit=fit, evidence=-5.0) for fit in nearby]
     return advise(given.campaign, given.problem, credible, behind)
@@ -86,7 +86,7 @@ def test_a_zero_is_parted_from_wear_by_an_open_clutch(warm):
     assert "repeats" not in {each.key for each in found}
 
 
-def beside(given: Study, slug: str, amplitude: float, shape: tuple[float, ...]) -> Fit:
+def beside(given: Study, slug: str, amplitude: float, shape: tuple[float, ...]) -> PooledFit:
     """The baseline with an effect as large as wanted beside it, not fitted."""
     return replace(given.baseline.fit, effects=(of_size(slug, amplitude, shape),))
 
@@ -111,7 +111,7 @@ def test_what_was_predicted_is_what_the_test_brings(warm):
     assert brought("repeats") < 0.2 * best.nats
 
 
-def with_measured(given: Campaign, key: str, truth: Fit) -> Campaign:
+def with_measured(given: Campaign, key: str, truth: PooledFit) -> Campaign:
     """The trial's runs with the torque that the fitted model gives there, and noise of one percent."""
     then = with_trial(given, key)
     at = build_design(then)

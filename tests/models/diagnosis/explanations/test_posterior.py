@@ -8,7 +8,7 @@ import pytest
 
 from models.diagnosis.campaign import Campaign, EventKind, MaintenanceEvent, StationaryRun
 from models.diagnosis.criteria import ANYTHING_WRONG, ISOLABLE, SURE
-from models.diagnosis.effects.fitted_effect import Estimate
+from models.diagnosis.effects.fitted_effect import AmplitudeEstimate
 from models.diagnosis.explanations.decide import decide, explanations_of
 from models.diagnosis.explanations.posterior import Prior, Search, posterior_of
 from models.diagnosis.explanations.shapeless import outlying_run, temperature_evidence
@@ -46,7 +46,7 @@ def plain() -> Baseline:
 
 
 def record(effect: str, evidence: float) -> RawEvidence:
-    estimate = Estimate(name="amplitude", value=0.1, sd=0.01, unit="Nm")
+    estimate = AmplitudeEstimate(name="amplitude", value=0.1, sd=0.01, unit="Nm")
     return RawEvidence(effect=effect, log_evidence=evidence, estimate=estimate, note="torque swings")
 
 

@@ -13,7 +13,7 @@ from models.diagnosis.effects.effect import FROM_THE_START
 from models.diagnosis.effects.fitted_effect import FittedEffect
 from models.diagnosis.effects.thermal import AT_ONCE
 from models.diagnosis.pooled_fit.baseline_fit import fit_baseline
-from models.diagnosis.pooled_fit.gauss_newton import REFIT_STEPS, Fit, FitStatus, fit, prior_gram, refit
+from models.diagnosis.pooled_fit.gauss_newton import REFIT_STEPS, FitStatus, PooledFit, fit, prior_gram, refit
 from models.diagnosis.pooled_fit.projection import RunScatter, gram_of, law_torque, projections_of, run_scatter
 from tests.blind.rig.hide import hide
 from tests.blind.rig.sent import campaign as sent
@@ -65,14 +65,14 @@ def test_a_refit_comes_back_from_a_baseline_whose_viscous_torque_is_negative(see
 
 
 @pytest.fixture(scope="module")
-def beside_heat(given: Study) -> Fit:
+def beside_heat(given: Study) -> PooledFit:
     """The laws off their priors' means, and an effect of some size."""
     laws = given.baseline.fit.laws
     off = replace(laws, theta=laws.theta + 0.1)
     return fit(given.problem, off, (of_size("interface_heating", 0.3, (2.0, 0.0, 1.0)),), steps=0)
 
 
-def test_the_gradient_of_the_priors_is_the_slope_of_their_cost(given: Study, beside_heat: Fit) -> None:
+def test_the_gradient_of_the_priors_is_the_slope_of_their_cost(given: Study, beside_heat: PooledFit) -> None:
     priors, (heat,), theta = given.problem.priors, beside_heat.effects, beside_heat.laws.theta
 
     def cost(theta: FloatArray, amplitude: float) -> float:
@@ -89,7 +89,7 @@ def test_the_gradient_of_the_priors_is_the_slope_of_their_cost(given: Study, bes
     assert slopes[free.size] == pytest.approx(slope, rel=1e-5)
 
 
-def test_the_projection_holds_the_priors(given: Study, beside_heat: Fit) -> None:
+def test_the_projection_holds_the_priors(given: Study, beside_heat: PooledFit) -> None:
     priors = given.problem.priors
     firmer = replace(priors, rows=np.sqrt(2.0) * priors.rows, means=np.sqrt(2.0) * priors.means)
     usual = gram_of(given.problem, beside_heat)

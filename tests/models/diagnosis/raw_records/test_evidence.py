@@ -11,7 +11,7 @@ from scipy.special import i0e
 
 from models.arrays import FloatArray
 from models.diagnosis.campaign import Campaign, DynamicRun, StationaryRun
-from models.diagnosis.effects.fitted_effect import Estimate
+from models.diagnosis.effects.fitted_effect import AmplitudeEstimate
 from models.diagnosis.raw_records import whitened_torque
 from models.diagnosis.raw_records.evidence import raw_evidence
 from models.diagnosis.raw_records.settling_transient import settling_evidence
@@ -372,7 +372,7 @@ def record(*, share: float = 0.0, late: float = 2.0, lag: float = 0.15, drift: f
     return Record(time=time, pressure=np.full(speed.size, 5e5), speed=speed, torque=torque + 0.1 * noise)
 
 
-def evidence_of(**wanted: float) -> tuple[float, Estimate]:
+def evidence_of(**wanted: float) -> tuple[float, AmplitudeEstimate]:
     made = record(**wanted)
     return settling_evidence([(made, cut_plateaus(made))])
 

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from models.diagnosis.effects.catalogue import BY_SLUG
-from models.diagnosis.effects.fitted_effect import Draw, Estimate
+from models.diagnosis.effects.fitted_effect import AmplitudeEstimate, Draw
 from models.diagnosis.explanations.decide import judge
 from models.diagnosis.explanations.posterior import Posterior, posterior_of
 from models.diagnosis.explanations.sizes import Size, Sizes, sizes_of
 from models.diagnosis.explanations.verdict import Judgement, Verdict
-from models.diagnosis.pooled_fit.gauss_newton import Fit, FitStatus
+from models.diagnosis.pooled_fit.gauss_newton import FitStatus, PooledFit
 from models.diagnosis.pooled_fit.projection import left_over, without_likely_gains
 from models.diagnosis.raw_records.evidence import RawEvidence
 from models.diagnosis.report.assemble import ADOPT_NOTHING, candidates_of, reason_against, report_of
@@ -41,7 +41,7 @@ def reported(
     given: Study,
     posterior: Posterior,
     judgement: Judgement,
-    extended: Fit | None = None,
+    extended: PooledFit | None = None,
     gain: Gain | None = None,
     sizes: Sizes | None = None,
 ) -> Report:
@@ -132,7 +132,7 @@ def test_sweeps_without_a_thermometer_tell_some_causes_apart() -> None:
 
 
 def test_the_size_of_a_swing_has_no_sign(given: Study) -> None:
-    estimate = Estimate(name="ripple amplitude", value=0.5, sd=0.02, unit="Nm", one_sided=True)
+    estimate = AmplitudeEstimate(name="ripple amplitude", value=0.5, sd=0.02, unit="Nm", one_sided=True)
     raw = (RawEvidence(effect="shaft_ripple", log_evidence=50.0, estimate=estimate, note="it swings"),)
     found = posterior_of(given.baseline, raw)
     (ripple,) = (
@@ -188,7 +188,7 @@ def test_what_maps_and_loops_show_is_the_error_that_the_report_states(bumped: St
     noise = replace(bumped.problem.noise, run_gain=0.02)
     problem = replace(bumped.problem, design=replace(design, torque=off * design.torque), noise=noise)
 
-    def against_these(fit: Fit) -> Fit:
+    def against_these(fit: PooledFit) -> PooledFit:
         return replace(fit, residual=problem.design.torque - fit.torque)
 
     known = bumped.baseline

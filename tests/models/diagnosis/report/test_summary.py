@@ -11,7 +11,7 @@ import pytest
 from models.diagnosis.criteria import MAX_WORDS
 from models.diagnosis.design.design import FREQUENCY
 from models.diagnosis.effects.catalogue import BY_SLUG, CATALOGUE
-from models.diagnosis.effects.fitted_effect import Estimate
+from models.diagnosis.effects.fitted_effect import AmplitudeEstimate
 from models.diagnosis.experiments.candidates import TRIALS, Step
 from models.diagnosis.experiments.test_plan import Advice
 from models.diagnosis.explanations.verdict import UNCATALOGUED, Explanation, Verdict, Where
@@ -45,7 +45,7 @@ NO_BETTER = replace(GAIN, forecast_log_score_gain=-1.0)
 
 def candidate(slug: str, probability: float, evidence: float = 30.0) -> Candidate:
     effect = BY_SLUG[slug]
-    estimate = Estimate(name=effect.amplitude, value=0.3634, sd=0.0547, unit=effect.unit)
+    estimate = AmplitudeEstimate(name=effect.amplitude, value=0.3634, sd=0.0547, unit=effect.unit)
     return Candidate(
         effect=slug, title=effect.title, probability=probability, log_evidence_gain=evidence, estimate=estimate
     )
@@ -55,7 +55,9 @@ def visible(slug: str, sizes: float) -> Visible:
     """An effect that so many of its usual sizes would have shown."""
     effect = BY_SLUG[slug]
     usual = effect.scale * effect.prior_sd
-    return Visible(effect=slug, amplitude=sizes * usual, least=sizes * usual / 2, usual=usual, unit=effect.unit)
+    return Visible(
+        effect=slug, amplitude=sizes * usual, least=sizes * usual / 2, usual=usual, unit=effect.unit, isolability=1.0
+    )
 
 
 def weights(verdict: Verdict, causes: tuple[str, ...]) -> dict[tuple[str, ...], float]:
@@ -193,7 +195,9 @@ def test_why_nothing_may_be_adopted_stands_in_the_paragraph() -> None:
 
 def test_of_an_alternative_that_has_an_estimate_the_size_is_said_where_its_sign_is_sure() -> None:
     found = findings(Verdict.CAUSE_AMBIGUOUS, "torque_zero_shift")
-    nobody = replace(candidate("oil_temperature", 0.3), estimate=Estimate(name="β", value=0.0, sd=0.7, unit="-"))
+    nobody = replace(
+        candidate("oil_temperature", 0.3), estimate=AmplitudeEstimate(name="β", value=0.0, sd=0.7, unit="-")
+    )
     listed = explanations_of({("torque_zero_shift",): 0.7, ("oil_temperature",): 0.3})
     said = summarise(replace(found, explanations=listed, candidates=(*found.candidates, nobody)))
     assert "a torque zero shift (0.70; 0.363 Nm) or changed oil temperature (0.30)." in said
@@ -402,7 +406,7 @@ def test_any_amplitude_can_be_written():
     found = findings(Verdict.CAUSE_NAMED, "oil_change")
     for _ in range(300):
         value, sd = rng.choice([-1, 1]) * 10 ** rng.uniform(-12, 12), 10 ** rng.uniform(-12, 12)
-        estimate = Estimate(name="step", value=value, sd=float(rng.choice([0.0, sd])), unit="%")
+        estimate = AmplitudeEstimate(name="step", value=value, sd=float(rng.choice([0.0, sd])), unit="%")
         said = summarise(replace(found, candidates=(replace(found.candidates[0], estimate=estimate),)))
         way, told = re.search(r"stepped (up|down) by (-?[\d.,e+-]+)", said.replace("−", "-")).groups()
         number = float(told.rstrip(".").replace(",", "")) * (1 if way == "up" else -1)

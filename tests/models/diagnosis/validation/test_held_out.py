@@ -16,7 +16,7 @@ from models.diagnosis.design.design import TEMPERATURE as TEMPERATURE_AXIS
 from models.diagnosis.effects.catalogue import BY_SLUG
 from models.diagnosis.effects.fitted_effect import FittedEffect, law_columns
 from models.diagnosis.effects.thermal import AT_ONCE
-from models.diagnosis.pooled_fit.gauss_newton import Fit, fit
+from models.diagnosis.pooled_fit.gauss_newton import PooledFit, fit
 from models.diagnosis.pooled_fit.problem import FitProblem
 from models.diagnosis.pooled_fit.projection import law_torque
 from models.diagnosis.validation import held_out
@@ -38,11 +38,11 @@ def plain() -> Study:
     return study(campaign(11, loops=False))
 
 
-def gain_of(given: Study, extended: Fit) -> Gain:
+def gain_of(given: Study, extended: PooledFit) -> Gain:
     return gain_over(given.problem, given.baseline.fit, extended)
 
 
-def gain_over(problem: FitProblem, before: Fit, after: Fit) -> Gain:
+def gain_over(problem: FitProblem, before: PooledFit, after: PooledFit) -> Gain:
     return measure_gain(FittedModel(problem, before), FittedModel(problem, after), np.random.default_rng(0))
 
 
@@ -210,7 +210,7 @@ def slowly() -> Study:
     return study(campaign(41, slow, loops=False))
 
 
-def smoothed(given: Study, *axes: str) -> Fit | None:
+def smoothed(given: Study, *axes: str) -> PooledFit | None:
     return smooth_fit(given.problem, given.baseline.fit, axes)
 
 
