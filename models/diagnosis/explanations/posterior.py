@@ -173,6 +173,13 @@ class Prior:
         return float(value)
 
 
+class Lead(NamedTuple):
+    """The most that a refit has brought, and its cost under the search's noise: what others must come near to."""
+
+    log_evidence: float
+    cost: float
+
+
 class Search:
     """The nodes and what else is promised, as the search goes on."""
 
@@ -183,7 +190,8 @@ class Search:
         self._raw = {r.effect: r.log_evidence for r in raw if r.effect in BY_SLUG and not is_vibration(r)}
         self.problem = self._null_problem = baseline.problem
         self._columns, self._changes = _shown(self.problem, baseline.fit, columns_of([*effects, *FAULTS], facts))
-        null = self._node(baseline.fit, (), (), self._changes, smooth=True)
+        fitted = baseline.fit
+        null = self._node(fitted, (), (), self._changes, smooth=True)
         if null is None:
             raise ArithmeticError("the baseline's evidence is not finite")
         shown = {column.effect.slug for column in self._columns}
@@ -196,10 +204,12 @@ class Search:
         if best is not None and best.promise > 0.0:  # the gains that suit the best, for the metric of all refits
             likely = null.evidence.screened[best.gain]
             self.problem = baseline.problem.with_noise(likely.noise(baseline.problem.noise))
-            again = self._node(fit(self.problem, baseline.fit.laws), (), (), self._changes, smooth=True)
+            fitted = fit(self.problem, baseline.fit.laws)
+            again = self._node(fitted, (), (), self._changes, smooth=True)
             if again is not None and again.log_evidence > null.log_evidence:
                 null, self._null_problem = again, self.problem
         self.nodes: dict[Alternative, list[Node]] = {NOTHING: [null]}
+        self._lead = Lead(null.log_evidence, fitted.cost)
         self.refits = 0
         self._promises: dict[Key, tuple[float, Node, Start | None]] = {}
         self._failed = set[Alternative]()
@@ -279,7 +289,7 @@ class Search:
         for key, (promise, _, _) in sorted(self._promises.items(), key=lambda item: item[1][0]):
             if len(key[0].causes) == 1 and not key[0].unknown and promise > self.null.log_evidence:
                 best[key[0]] = key
-        for key in best.values():
+        for key in sorted(best.values(), key=lambda key: -self._promises[key][0]):
             self._take(key)
 
     def _screen(self, alternatives: set[Alternative]) -> None:
@@ -342,15 +352,17 @@ class Search:
         # beside a loud cause the law's form goes as far as its sizes allow, and bends eq. 3 along: from there a refit with
         # the cause may end elsewhere
         laws = (start.laws, self._exact)[: 2 if len(effects) == 1 else 1]
-        refits = [fitted for one in laws if (fitted := refit(self.problem, one, effects)) is not None]
-        fitted = min(refits, key=lambda one: one.cost, default=None)
+        slack = criteria.SLACK * (self._lead.log_evidence - self.null.log_evidence)
+        fitted = refit(self.problem, laws, effects, self._lead.cost + slack)
         node = None if fitted is None else self._node(fitted, alternative.causes, shape_evidence)
-        if node is not None and (problem := self._suiting(node)).noise.law != self.problem.noise.law:
+        near = node is not None and node.log_evidence > self._lead.log_evidence - slack
+        if node is not None and near and (problem := self._suiting(node)).noise.law != self.problem.noise.law:
             # beside another law than is likely with its causes it was not expanded about what is likely
-            closer = refit(problem, node.fit.laws, node.fit.effects)
+            closer = refit(problem, [node.fit.laws], node.fit.effects)
             node = None if closer is None else self._node(closer, alternative.causes, shape_evidence)
-        if node is None:
+        if node is None or fitted is None:
             return
+        self._lead = max(self._lead, Lead(node.log_evidence, fitted.cost))
         node = replace(node, promise=max(promise, node.log_evidence + self.prior(alternative)))
         before = self.nodes.get(alternative, [])
         first = not before or node.log_evidence > before[0].log_evidence

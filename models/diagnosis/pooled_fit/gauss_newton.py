@@ -56,16 +56,24 @@ class PooledFit:
         return any(effect.wrong_sign for effect in self.effects)
 
 
-def fit(problem: FitProblem, start: Laws, effects: Sequence[FittedEffect] = (), *, steps: int = STEPS) -> PooledFit:
-    """Minimise the cost from a start, effects included; `steps` at most.
+def fit(
+    problem: FitProblem,
+    start: Laws,
+    effects: Sequence[FittedEffect] = (),
+    *,
+    steps: int = STEPS,
+    reach: float = math.inf,
+) -> PooledFit:
+    """Minimise the cost from a start, effects included; `steps` at most, and no further where at the pace of its last two
+    steps the fit would not come down to a cost of `reach`.
 
     Gains are taken along one torque (`FitProblem.gained`), which keeps the metric fixed while a fit moves.
     """
     metric, priors = problem.metric(), problem.priors
     state = _evaluated(problem, metric, start, tuple(effects))
     damping, growth = 1e-3, 2.0
-    status = FitStatus.OUT_OF_STEPS
-    for _ in range(steps):
+    status, pace = FitStatus.OUT_OF_STEPS, math.inf
+    for left in reversed(range(steps)):
         with np.errstate(over="ignore", invalid="ignore"):
             gram, gradient = _normal(problem, metric, state)
         if not np.isfinite(gram).all():
@@ -93,6 +101,9 @@ def fit(problem: FitProblem, start: Laws, effects: Sequence[FittedEffect] = (), 
         if fallen < 0.01:  # nats
             status = FitStatus.CONVERGED
             break
+        if state.cost - left * max(pace, fallen) > reach:
+            break
+        pace = fallen
     return replace(state, status=status if np.isfinite(state.cost) else FitStatus.NOT_FINITE)
 
 
@@ -202,13 +213,21 @@ def _moved(state: PooledFit, priors: Priors, step: FloatArray) -> tuple[Laws, tu
 REFIT_STEPS = 40
 
 
-def refit(problem: FitProblem, laws: Laws, effects: tuple[FittedEffect, ...]) -> PooledFit | None:
-    """The fit from laws and effects; None where a one-sided effect is negative or nothing finite fits."""
+def refit(
+    problem: FitProblem, starts: Sequence[Laws], effects: tuple[FittedEffect, ...], reach: float = math.inf
+) -> PooledFit | None:
+    """The best fit from each of several laws with effects; None where a one-sided effect is negative or nothing finite fits.
+    A start is followed while it may still come down to `reach`, and to the best of those before it."""
     if any(effect.wrong_sign for effect in effects):
         return None
-    fits = [fit(problem, *start, steps=REFIT_STEPS) for start in _starts(problem.design, laws, effects)]
-    possible = [fitted for fitted in fits if not (fitted.wrong_sign or fitted.status is FitStatus.NOT_FINITE)]
-    return min(possible, key=lambda fitted: fitted.cost, default=None)
+    best = None
+    for laws in starts:
+        for start in _starts(problem.design, laws, effects):
+            fitted = fit(problem, *start, steps=REFIT_STEPS, reach=reach if best is None else min(reach, best.cost))
+            possible = not (fitted.wrong_sign or fitted.status is FitStatus.NOT_FINITE)
+            if possible and (best is None or fitted.cost < best.cost):
+                best = fitted
+    return best
 
 
 def _starts(
@@ -251,5 +270,5 @@ def refit_beside(problem: FitProblem, start: PooledFit, pattern: FloatArray) -> 
     moves to where it leaves that pattern."""
     design = problem.design
     without = replace(problem, design=replace(design, torque=design.torque - pattern))
-    fitted = refit(without, start.laws, start.effects)
+    fitted = refit(without, [start.laws], start.effects)
     return None if fitted is None else replace(fitted, residual=fitted.residual + pattern)

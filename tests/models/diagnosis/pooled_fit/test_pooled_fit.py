@@ -55,7 +55,7 @@ def test_a_refit_comes_back_from_a_baseline_whose_viscous_torque_is_negative(see
     exact, beside = (bent.problem.exact, bent.baseline.exact), (bent.problem, bent.baseline.fit)
     for (problem, baseline), least in ((exact, 50.0), (beside, 3.0)):  # without loops most of it is the law's form
         assert baseline.laws.theta[3 * BLOCK] < 0.0
-        found = refit(problem, baseline.laws, (heat,))
+        found = refit(problem, [baseline.laws], (heat,))
         assert found is not None
         assert found.cost < fit(problem, baseline.laws, (heat,), steps=REFIT_STEPS).cost - least
         assert found.effects[0].amplitude > 0.3
