@@ -4,8 +4,7 @@ No build step: the tree `static/` is served as it stands, below one folder that 
 that modules find each other by relative imports and a new version is a new address. A page names all modules that it will
 load, so that the browser asks for them at once, and not for each when another has come that imports it. A file's name is
 its path in the tree, as `shared/api.js`. What is not read here at start-up has no name: a request looks names up in a
-dictionary and never touches the disk. The plotting library's JavaScript is the one in the installed wheel of plotly, which
-is located and never imported.
+dictionary and never touches the disk.
 """
 
 import gzip
@@ -14,7 +13,7 @@ import posixpath
 import re
 from dataclasses import dataclass
 from functools import cached_property
-from importlib.metadata import distribution, version
+from importlib.metadata import version
 from pathlib import Path
 
 STATIC = Path(__file__).parent / "static"
@@ -86,11 +85,9 @@ class Assets:
 
 
 def load(folder: Path = STATIC) -> Assets:
-    """Read every file of the tree, and the plotting library."""
+    """Read every file of the tree."""
     paths = sorted(path for path in folder.rglob("*") if path.suffix in TYPES and path.is_file())
     assets = [read(path, path.relative_to(folder).as_posix()) for path in paths]
-    library = Path(str(distribution("plotly").locate_file("plotly/package_data/plotly.min.js")))
-    assets.append(read(library, library.name))
     listing = "".join(f"{asset.name} {asset.digest}\n" for asset in assets)
     digest = hashlib.sha256(listing.encode()).hexdigest()[:16]
     return Assets(by_name={asset.name: asset for asset in assets}, digest=digest)

@@ -1,14 +1,14 @@
-// The charts: answers of the API go in, figures with a title, a table, a PNG and a CSV come out. Open this file first (one
-// chart; until someone points at it, and where the plotting library does not load, its drawing is a light one), then life.js:
-// like fan.js, loops.js, parameters.js and stribeck.js it says what its charts show; the others say how a chart is drawn.
+// The charts: answers of the API go in, figures with a title, a table and files come out. Open this file first (one chart),
+// then life.js: like fan.js, loops.js, parameters.js and stribeck.js it says what its charts show; the others say how a chart
+// is placed (frame.js), drawn (draw.js), read and zoomed (reading.js) and saved (picture.js).
 
-import { button, h, quiet, save, scrolling, select, symbol, table, watch } from "../shared/dom.js";
+import { button, h, markShown, quiet, saveBlob, scrolling, select, symbol, table, watch } from "../shared/dom.js";
 import { saveTable } from "../shared/files.js";
-import { settled } from "./frame.js";
-import { base, config } from "./layout.js";
+import { draw } from "./draw.js";
+import { framed } from "./frame.js";
 import { colours } from "./palette.js";
-import { has3d, painted, plotly, want, wanted } from "./plotting.js";
-import { sketch } from "./sketch.js";
+import { pngOf } from "./picture.js";
+import { reading } from "./reading.js";
 
 /**
  * @typedef {object} Options
@@ -16,42 +16,48 @@ import { sketch } from "./sketch.js";
  * @property {string} title
  * @property {() => string} name the start of saved files' names
  * @property {[string, string] | null} [letter] a symbol with its index, after the title
- * @property {boolean} [spatial] whether it is drawn in 3D, which needs WebGL
  * @property {boolean} [wide]
  * @property {number} [height] px
  */
 
 const MOST_ROWS = 400;
-const NO_WEBGL = "This browser does not draw in 3D (WebGL is off). The table holds the numbers.";
-const NO_LIBRARY = "The plotting library did not load. The table holds the numbers.";
-
-/** @param {PointerEvent} event of a finger, it may be about to scroll: a tap is a click */
-const pointed = (event) => event.pointerType !== "touch" && want();
+const HELP = "Arrow keys read its values, + and − zoom, Escape shows all. The numbers are in the table below.";
+/** Of saved files, px. */
+const SAVED = { width: 1000, height: 600 };
 
 export class Chart {
   /** @param {Options} options */
-  constructor({ id, title, name, letter = null, spatial = false, wide = false, height = 360 }) {
+  constructor({ id, title, name, letter = null, wide = false, height = 360 }) {
     this.id = id;
     this.title = title;
     this.name = name;
-    this.spatial = spatial;
     this.height = height;
     /** @type {Spec | null} */
     this.spec = null;
     this.stale = false;
     this.visible = false;
-    this.turn = 0;
+    /** @type {Framed | null} */
+    this.framed = null;
+    /** @type {Colours | null} */
+    this.colours = null;
+    /** @type {Zoom[]} */
+    this.zooms = [];
+    this.axes = "";
     this.note = h("p.note", "Reading what it shows …");
     this.controls = h("div.row.controls");
-    this.ask = button("Draw it (loads 1.4 MB once)", want, { class: "small", hidden: true });
-    const style = { "min-height": `${height}px` };
-    const watched = { onpointerenter: pointed, onclick: want };
-    this.plot = h("div.plot", { role: "img", "aria-label": title, style, ...watched });
+    this.plot = h("div.plot", { role: "application", style: { "min-height": `${height}px` } });
+    this.forget = reading(this.plot, this);
     this.table = scrolling(`${title}: table`);
     this.details = h("details", { ontoggle: () => this.fill() }, h("summary", "Table"), this.table);
+    this.whole = this.button("Show all", "show all of it", () => {
+      this.zooms = [];
+      this.redraw();
+    });
     this.tools = h(
       "div.tools",
-      this.button("PNG", "save as PNG", () => this.savePng()),
+      this.whole,
+      this.button("PNG", "save as PNG", async () => saveBlob(this.file("png"), await pngOf(this.light(SAVED), 2))),
+      this.button("SVG", "save as SVG", () => this.saveSvg()),
       this.button("CSV", "save data as CSV", () => this.saveTable("csv")),
       this.button("XLSX", "save data as XLSX", () => this.saveTable("xlsx")),
     );
@@ -61,7 +67,6 @@ export class Chart {
       { class: `chart panel${wide ? " wide" : ""}`, id: `chart-${id}` },
       h("figcaption", heading, this.tools, this.note),
       this.controls,
-      this.ask,
       this.plot,
       this.details,
     );
@@ -79,14 +84,15 @@ export class Chart {
   show(spec) {
     this.spec = spec;
     this.note.textContent = spec.note ?? "";
-    const nothing = spec.empty ?? (this.spatial && !has3d() ? NO_WEBGL : null);
-    this.element.classList.toggle("empty", nothing !== null);
-    if (nothing !== null) {
-      this.ask.hidden = true;
-      this.clear();
-      this.plot.replaceChildren(h("p.nothing", nothing));
-    } else if (this.plot.querySelector(".nothing")) this.plot.replaceChildren();
-    this.plot.setAttribute("aria-label", `${this.title}. ${spec.note ?? ""} The numbers are in the table below.`);
+    const nothing = spec.empty !== undefined;
+    this.element.classList.toggle("empty", nothing);
+    if (nothing) {
+      delete this.element.dataset.drawn;
+      this.framed = null;
+      this.plot.replaceChildren(h("p.nothing", spec.empty));
+    }
+    this.plot.tabIndex = nothing ? -1 : 0;
+    this.plot.setAttribute("aria-label", nothing ? this.title : `${this.title}. ${spec.note} ${HELP}`);
     this.tools.hidden = this.details.hidden = !spec.rows?.length;
     if (this.details.open) this.fill();
     this.redraw();
@@ -99,73 +105,32 @@ export class Chart {
   }
 
   redraw() {
-    this.stale = this.spec !== null && !this.element.classList.contains("empty");
+    this.stale = this.spec?.figure !== undefined;
     if (this.visible && this.stale) this.draw();
   }
 
-  async draw() {
+  /** In the colours of now; not while there is no room, as in a hidden tab: then when it is next looked at. */
+  draw() {
+    const width = this.plot.clientWidth;
+    if (!this.spec?.figure || width <= 0) return;
     this.stale = false;
-    this.turn += 1;
-    const { turn } = this;
-    if (!this.element.dataset.drawn) this.sketch();
-    await wanted;
-    if (turn !== this.turn) return;
-    let library;
-    try {
-      library = await plotly();
-    } catch {
-      this.stale = true; // tried again when the chart is next looked at
-      if (!this.plot.hasChildNodes()) this.plot.append(h("p.nothing", NO_LIBRARY));
-      return;
-    }
-    const figure = this.figure();
-    if (turn !== this.turn) return;
-    if (figure === null) {
-      this.stale = true; // its tab was left meanwhile: drawn when it is next looked at
-      return;
-    }
-    this.ask.hidden = true;
-    await library.react(this.plot, figure.data, figure.layout, config(this.spatial));
-    this.plot.querySelector(".sketch, .nothing")?.remove();
+    this.colours = colours();
+    const figure = this.spec.figure(this.colours);
+    const axes = figure.map(({ x, y }) => `${x.title} ${y.title}`).join();
+    if (axes !== this.axes) this.zooms = []; // another quantity
+    this.axes = axes;
+    this.framed = framed(figure, { width, height: this.height }, this.zooms);
+    this.whole.hidden = this.zooms.length === 0;
+    this.forget();
+    this.plot.querySelector(".drawing, .nothing")?.remove();
+    this.plot.style.minHeight = `${this.framed.size.height}px`;
+    this.plot.prepend(draw(this.framed, this.colours, { class: "drawing", "aria-hidden": "true" }));
+    if (!this.element.dataset.drawn) markShown(`drawn ${this.id}`);
     this.element.dataset.drawn = "yes";
-    performance.mark(`drawn ${this.id}`);
   }
 
-  /**
-   * Data and layout in the colours of now, or of a scheme; null where there is nothing to draw, or no room (a hidden tab).
-   * @param {Scheme} [scheme]
-   * @param {Partial<Size> & { compact?: boolean }} [size]
-   * @returns {SettledFigure | (WholeFigure & { ticks?: undefined }) | null}
-   */
-  figure(scheme = null, { width = this.plot.clientWidth, height = this.height, compact = width < 480 } = {}) {
-    if (!this.spec?.figure || this.element.classList.contains("empty") || width <= 0) return null;
-    const c = colours(scheme);
-    const { data, layout } = this.spec.figure(c);
-    const whole = { data, layout: base(c, layout, { height, compact }) };
-    return settled(whole, { width, height }) ?? whole;
-  }
-
-  /** What can be drawn without the library is drawn at once; for the rest someone asks, so that a page stays light. */
-  sketch() {
-    const figure = this.figure();
-    this.ask.hidden = !figure || Boolean(figure.ticks) || Boolean(globalThis.Plotly);
-    if (!figure?.ticks) return;
-    this.plot.querySelector(".sketch, .nothing")?.remove();
-    this.plot.append(sketch(figure, { width: this.plot.clientWidth, height: this.height }));
-    this.element.dataset.sketched = "yes";
-    painted().then(() => performance.mark(`sketched ${this.id}`));
-  }
-
-  /** The light drawing is of one width; the library follows by itself. */
   resized() {
-    if (this.element.dataset.sketched && !this.element.dataset.drawn && this.plot.clientWidth > 0) this.sketch();
-  }
-
-  clear() {
-    this.turn += 1;
-    if (this.element.dataset.drawn) globalThis.Plotly?.purge(this.plot);
-    delete this.element.dataset.drawn;
-    delete this.element.dataset.sketched;
+    if (this.framed && this.plot.clientWidth !== this.framed.size.width) this.redraw();
   }
 
   fill() {
@@ -177,34 +142,31 @@ export class Chart {
     this.table.replaceChildren(table(this.title, names, cells), rows.length > cells.length ? quiet(cut) : "");
   }
 
-  /**
-   * The light drawing as an image's address, in any size and scheme; null where there is none.
-   * @param {Size & { scheme?: Scheme }} options
-   */
-  light({ width, height, scheme = null }) {
-    const figure = this.figure(scheme, { width, height, compact: false });
-    if (!figure?.ticks) return null;
-    const text = new XMLSerializer().serializeToString(sketch(figure, { width, height }));
-    return `data:image/svg+xml,${encodeURIComponent(text)}`;
+  /** @type {(size: Size) => SVGSVGElement} the drawing in the light scheme, for paper, as it is zoomed */
+  light(size) {
+    const c = colours("light");
+    return draw(framed(this.spec?.figure?.(c) ?? [], size, this.zooms), c, {
+      class: "drawing",
+      role: "img",
+      "aria-label": this.title,
+    });
   }
 
-  async savePng() {
-    const library = await plotly();
-    const [width, height] = [1000, 600];
-    if (this.spatial && !this.element.dataset.drawn) await this.draw();
-    const figure = this.figure(null, { width, height, compact: false });
-    if (figure === null) return;
-    // a chart in 3D is saved as it has been turned
-    const shown = this.spatial ? this.plot : { data: figure.data, layout: { ...figure.layout, width } };
-    const image = await library.toImage(shown, { format: "png", width, height, scale: 2 });
-    save(`${this.name()}-${this.id}.png`, image);
+  saveSvg() {
+    const text = new XMLSerializer().serializeToString(this.light(SAVED));
+    saveBlob(this.file("svg"), new Blob([text], { type: "image/svg+xml" }));
   }
 
   /** @param {"csv" | "xlsx"} format */
   saveTable(format) {
     if (!this.spec?.rows) return;
     const { columns, rows } = this.spec;
-    saveTable(`${this.name()}-${this.id}.${format}`, [columns.map(({ name }) => name), ...rows]);
+    saveTable(this.file(format), [columns.map(({ name }) => name), ...rows]);
+  }
+
+  /** @param {string} ending */
+  file(ending) {
+    return `${this.name()}-${this.id}.${ending}`;
   }
 }
 

@@ -2,9 +2,8 @@
 
 import { cycles, estimate, fixed, interval, probability } from "../shared/format.js";
 import { column, CYCLES, KIND, measuredAndLaw } from "./columns.js";
-import { eventMarks, vertical } from "./layout.js";
 import { faint } from "./palette.js";
-import { band, lineOf, measuredPoints, titled } from "./traces.js";
+import { band, eventMarks, measuredPoints } from "./traces.js";
 
 /** @typedef {{ at: number, cof: number | null, remaining: SeriesItem }} Prediction made at `at` cycles, when mean COF was `cof` */
 
@@ -23,24 +22,19 @@ export function fan({ life, pooled, predictions, events }) {
     note: noteOf(life),
     columns: COLUMNS,
     rows: [...measuredAndLaw(pooled, { measured: "measured", law: "law" }), ...endRows(life)],
-    figure: (c) => {
-      const marks = [eventMarks(events, c), thresholdMarks(threshold, c), safeBound(life, last, c)];
-      const text = "%{x:,.0f} cycles<br>mean COF %{y:.4f}";
-      return {
-        data: [
+    figure: (c) => [
+      {
+        x: { title: "duty cycles", range: [-0.01 * last, last] },
+        y: { title: "mean COF" },
+        curves: [
           ...past(predictions, threshold, c),
           ...law(trajectory, life, c),
           ...endOfLife(life, threshold, c),
-          measuredPoints("measured", measured, { color: c.ink, text, size: 7, thickness: 1.2 }),
+          measuredPoints("measured", measured, { color: c.ink, size: 7 }),
         ],
-        layout: {
-          xaxis: { ...titled("duty cycles"), range: [-0.01 * last, last] },
-          yaxis: titled("mean COF"),
-          shapes: marks.flatMap(({ shapes }) => shapes),
-          annotations: marks.flatMap(({ annotations }) => annotations),
-        },
-      };
-    },
+        marks: [...eventMarks(events, c), ...thresholdMarks(threshold, c), ...safeBound(life, last, c)],
+      },
+    ],
   };
 }
 
@@ -83,36 +77,24 @@ function endRows({ criterion: { threshold_mean_cof: threshold }, end_of_life_cyc
   return Object.entries(end).map(([quantile, at]) => [name(quantile), at, threshold, null, null]);
 }
 
-/** @type {(y: number | null, c: Colours) => { shapes: Shape[], annotations: Annotation[] }} dashed, with its value */
-function thresholdMarks(y, c) {
-  if (y === null) return { shapes: [], annotations: [] };
-  const line = { color: c.failure, width: 1.6, dash: "dash" };
-  const font = { color: c.failure, size: 12 };
-  const text = `threshold ${fixed(y, 4)}`;
-  return {
-    shapes: [{ type: "line", x0: 0, x1: 1, xref: "paper", y0: y, y1: y, line }],
-    annotations: [{ x: 0, xref: "paper", xanchor: "left", y, yanchor: "bottom", text, showarrow: false, font }],
-  };
-}
+/** @type {(y: number | null, c: Colours) => Mark[]} dashed, with its value */
+const thresholdMarks = (y, c) =>
+  y === null ? [] : [{ y, line: { color: c.failure, width: 1.6, dash: "dash" }, text: `threshold ${fixed(y, 4)}` }];
 
 /**
  * Up to where the life lasts with 95 %: a line, where it is on the paper; `last`: cycles on the paper.
- * @type {(life: RemainingLife, last: number, c: Colours) => { shapes: Shape[], annotations: Annotation[] }}
+ * @type {(life: RemainingLife, last: number, c: Colours) => Mark[]}
  */
 function safeBound({ at_least: left, as_of_cycles: now, status }, last, c) {
   const x = (now ?? 0) + (left ?? 0);
-  if (left === null || left < 1 || x > last || status === "reached") return { shapes: [], annotations: [] };
-  const font = { color: c.normal, size: 12 };
+  if (left === null || left < 1 || x > last || status === "reached") return [];
   const text = `safe until ${cycles(x, 0, 1000)} (95 %)`;
-  return {
-    shapes: [vertical(x, { color: c.normal, width: 2, dash: "dot" })],
-    annotations: [{ x, y: 1, yref: "paper", yanchor: "top", xanchor: "right", text, showarrow: false, font }],
-  };
+  return [{ x, line: { color: c.normal, width: 2, dash: "dot" }, text }];
 }
 
 /**
  * Each earlier prediction as a line from mean COF when it was made to the predicted end of life.
- * @type {(predictions: Prediction[], threshold: number | null, c: Colours) => PlainTrace[]}
+ * @type {(predictions: Prediction[], threshold: number | null, c: Colours) => Curve[]}
  */
 function past(predictions, threshold, c) {
   const lines = predictions.slice(0, -1).flatMap(({ at, cof, remaining: { value } }) => {
@@ -122,7 +104,7 @@ function past(predictions, threshold, c) {
   const x = lines.flatMap(({ at, end }) => [at, end, null]);
   const y = lines.flatMap(({ cof }) => [cof, threshold, null]);
   const line = { color: faint(c.quiet, 0.45), width: 1 };
-  return [{ name: "earlier predictions", mode: "lines", x, y, line, hoverinfo: "skip" }];
+  return [{ name: "earlier predictions", x, y, line, silent: true }];
 }
 
 /**
@@ -131,7 +113,7 @@ function past(predictions, threshold, c) {
  * @param {Trajectory} trajectory
  * @param {RemainingLife} life
  * @param {Colours} c
- * @returns {PlainTrace[]}
+ * @returns {Curve[]}
  */
 function law(trajectory, life, c) {
   const end = life.end_of_life_cycles;
@@ -153,42 +135,31 @@ function law(trajectory, life, c) {
     };
   };
   return [
-    ...band("its 90 % band", joined(trajectory.lower, end["0.05"]), joined(trajectory.upper, end["0.95"]), c),
-    lineOf(
-      "ageing as tracked",
-      joined(trajectory.median, median),
-      { color: c.accent, width: 2.2 },
-      "%{x:,.0f} cycles<br>law %{y:.4f}",
-    ),
+    band("its 90 % band", joined(trajectory.lower, end["0.05"]), joined(trajectory.upper, end["0.95"]), c),
+    { name: "ageing as tracked", ...joined(trajectory.median, median), line: { color: c.accent, width: 2.2 } },
   ];
 }
 
-/** @type {(life: RemainingLife, threshold: number | null, c: Colours) => PlainTrace[]} */
+/** @type {(life: RemainingLife, threshold: number | null, c: Colours) => Curve[]} */
 function endOfLife(life, threshold, c) {
   const q = life.end_of_life_cycles;
   const median = q["0.5"];
   if (threshold === null || median === null) return [];
-  /** @type {(from: string, to: string, width: number, name: string) => PlainTrace} */
+  /** @type {(from: string, to: string, width: number, name?: string) => Curve} */
   const bar = (from, to, width, name) => ({
     name,
-    showlegend: name !== "",
-    mode: "lines",
     x: [q[from], q[to] ?? 10 * median],
     y: [threshold, threshold],
     line: { color: c.worn, width },
-    hoverinfo: "skip",
+    silent: true,
   });
   return [
     bar("0.05", "0.95", 5, "end of life, 90 % and 50 %"),
-    bar("0.25", "0.75", 11, ""),
+    bar("0.25", "0.75", 11),
     {
-      name: "median",
-      showlegend: false,
-      mode: "markers",
       x: [median],
       y: [threshold],
-      marker: { color: c.panel, size: 9, line: { color: c.worn, width: 3 } },
-      hovertemplate: "end of life<br>%{x:,.0f} cycles<extra></extra>",
+      marker: { color: c.panel, size: 9, edge: { color: c.worn, width: 3 } },
     },
   ];
 }

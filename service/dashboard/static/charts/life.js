@@ -2,7 +2,7 @@
 
 import { fixed } from "../shared/format.js";
 import { column, CYCLES, distinct, PRESSURE } from "./columns.js";
-import { band, linesByPressure, planar, titled } from "./traces.js";
+import { band, linesByPressure, planar } from "./traces.js";
 
 /** @import { Prediction } from "./fan.js" */
 
@@ -31,7 +31,7 @@ export function remainingCycles({ life, predictions, events }) {
     note: `The median and the 90 % interval as predicted at that time. ${comparison}${beyond}`,
     columns: [CYCLES, column("remaining cycles"), column("lower, 5 %"), column("upper, 95 %")],
     rows: predictions.map(({ at, remaining: r }) => [at, r.value, r.lower, r.upper]),
-    figure: planar("duty cycles at the prediction", { ...titled("remaining cycles"), range: [0, top] }, events, (c) =>
+    figure: planar("duty cycles at the prediction", { title: "remaining cycles", range: [0, top] }, events, (c) =>
       predictionTraces(made, end, top, c),
     ),
   };
@@ -42,29 +42,23 @@ export function remainingCycles({ life, predictions, events }) {
  * @param {number | null} end
  * @param {number} top
  * @param {Colours} c
- * @returns {PlainTrace[]}
+ * @returns {Curve[]}
  */
 function predictionTraces(made, end, top, c) {
   const x = made.map(({ at }) => at);
   const lower = made.map((prediction) => prediction.lower ?? 0);
   const upper = made.map((prediction) => Math.min(prediction.upper ?? Infinity, 4 * top));
-  /** @type {PlainTrace[]} */
-  const today = [];
-  if (end !== null) {
-    const line = { color: c.worn, width: 1.6, dash: "dash" };
-    today.push({ name: "today's median", mode: "lines", x: [0, end], y: [end, 0], line, hoverinfo: "skip" });
-  }
+  /** @type {Line} */
+  const line = { color: c.worn, width: 1.6, dash: "dash" };
   return [
-    ...band("90 % interval", { x, y: lower }, { x, y: upper }, c),
-    ...today,
+    band("90 % interval", { x, y: lower }, { x, y: upper }, c),
+    ...(end === null ? [] : [{ name: "today's median", x: [0, end], y: [end, 0], line, silent: true }]),
     {
       name: "predicted median",
-      mode: "lines+markers",
       x,
       y: made.map(({ value }) => value),
       line: { color: c.accent, width: 2 },
-      marker: { size: 6 },
-      hovertemplate: "predicted at %{x:,.0f} cycles<br>%{y:,.0f} cycles remain<extra></extra>",
+      marker: { color: c.accent },
     },
   ];
 }
@@ -83,8 +77,6 @@ export function meanCof({ tests, events }) {
     note: `Mean over the speeds of the first test, at ${count}, with 90 % error bars.`,
     columns: [CYCLES, PRESSURE, column("mean COF", 4), column("standard deviation", 5)],
     rows: values.map(({ cycles, pressure, value, sd }) => [cycles, pressure, value, sd]),
-    figure: planar("duty cycles", "mean COF", events, (c) =>
-      linesByPressure(values, { size: 5, bars: 2, text: "mean COF %{y:.4f}" }, c),
-    ),
+    figure: planar("duty cycles", "mean COF", events, (c) => linesByPressure(values, 5, c)),
   };
 }

@@ -6,7 +6,7 @@ import { named, pressureText, units } from "../shared/units.js";
 import { column, CYCLES, distinct, KIND, PRESSURE, torqueColumn } from "./columns.js";
 import { pressureRampOf, rampOf } from "./palette.js";
 import { curveOf, inUnit, measuredOf, xyOf } from "./stribeck_law.js";
-import { lineOf, planar } from "./traces.js";
+import { planar } from "./traces.js";
 
 /** @import { Answers } from "./stribeck.js" */
 /** @import { CurvePoint } from "./stribeck_law.js" */
@@ -92,22 +92,17 @@ export function loopCurves({ loops, tests, clutch, channels, over, pressure, run
     figure: planar("sliding speed, rpm", named(units().torque), [], (c) => {
       const colors = drawn.map((_, index) => (byState ? rampOf : pressureRampOf)(c, index, drawn.length));
       const lines = drawn.map(({ loop, trace }, index) => {
-        const text = `${label(loop)}<br>%{x:.0f} rpm, %{y:.4~g} ${units().torque.unit}<br>${lagText(loop)}`;
-        return lineOf(label(loop), xyOf(trace), { color: colors[index], width: 1.3 }, text);
+        return { name: label(loop), ...xyOf(trace), line: { color: colors[index], width: 1.3 } };
       });
       return [...stationaryTraces(drawn, colors), ...lines];
     }),
   };
 }
 
-/** @type {(drawn: { stationary: CurvePoint[] }[], colors: string[]) => PlainTrace[]} named once */
-function stationaryTraces(drawn, colors) {
-  const text = `stationary curve<br>%{x:.0f} rpm, %{y:.4~g} ${units().torque.unit}`;
-  const curves = drawn.map(({ stationary }, index) => ({ stationary, color: colors[index] }));
-  return curves
-    .filter(({ stationary }) => stationary.length > 0)
-    .map(({ stationary, color }, index) => {
-      const line = { color, width: 2, dash: "dash" };
-      return lineOf("stationary curve", xyOf(stationary), line, text, { showlegend: index === 0 });
-    });
-}
+/** @type {(drawn: { stationary: CurvePoint[] }[], colors: string[]) => Curve[]} */
+const stationaryTraces = (drawn, colors) =>
+  drawn.flatMap(({ stationary }, index) =>
+    stationary.length === 0
+      ? []
+      : [{ name: "stationary curve", ...xyOf(stationary), line: { color: colors[index], width: 2, dash: "dash" } }],
+  );

@@ -36,26 +36,22 @@ export function colours(scheme = null) {
 /** @type {(rgb: string) => number[]} red, green and blue of a computed colour */
 const channels = (rgb) => (rgb.match(/[\d.]+/g) ?? []).slice(0, 3).map(Number);
 
-/** @type {(stops: string[], nth: number, count: number) => string} from the first colour to the last */
-function between(stops, nth, count) {
-  const place = (count > 1 ? nth / (count - 1) : 0) * (stops.length - 1);
+/** @type {(stops: string[], share: number) => string} between the first colour, 0, and the last, 1 */
+export function blend(stops, share) {
+  const place = Math.min(1, Math.max(0, share)) * (stops.length - 1);
   const index = Math.min(stops.length - 2, Math.floor(place));
   const [from, to] = [channels(stops[index]), channels(stops[index + 1])];
   return `rgb(${from.map((value, channel) => Math.round(value + (to[channel] - value) * (place - index))).join(", ")})`;
 }
 
+/** @type {(index: number, count: number) => number} */
+const shareOf = (index, count) => (count > 1 ? index / (count - 1) : 0);
+
 /** @type {(c: Colours, index: number, count: number) => string} of the n-th of several, from fresh to worn */
-export const rampOf = (c, index, count) => between([c.fresh, c.midlife, c.worn], index, count);
+export const rampOf = (c, index, count) => blend([c.fresh, c.midlife, c.worn], shareOf(index, count));
 
 /** @type {(c: Colours, index: number, count: number) => string} from the lowest pressure to the highest */
-export const pressureRampOf = (c, index, count) => between([c.low, c.high], index, count);
+export const pressureRampOf = (c, index, count) => blend([c.low, c.high], shareOf(index, count));
 
 /** @type {(rgb: string, opacity: number) => string} the colour, partly transparent */
 export const faint = (rgb, opacity) => `rgba(${channels(rgb).join(", ")}, ${opacity})`;
-
-/** @type {(c: Colours) => [number, string][]} a colour scale from fresh to worn, for surfaces */
-export const scaleOf = (c) => [
-  [0, c.fresh],
-  [0.5, c.midlife],
-  [1, c.worn],
-];

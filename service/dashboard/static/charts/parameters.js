@@ -2,8 +2,8 @@
 
 import { estimate } from "../shared/format.js";
 import { CYCLES, intervalColumns, KIND, measuredAndLaw, PRESSURE } from "./columns.js";
-import { scaleOf } from "./palette.js";
-import { measuredPoints, planar, solid, spatialPoints, surfaceOf, titled, tracked } from "./traces.js";
+import { contoured, cutsOf } from "./contours.js";
+import { measuredPoints, planar, tracked } from "./traces.js";
 
 /** @typedef {"static_torque_nm" | "coulomb_ratio" | "stribeck_velocity_m_s" | "viscous_coefficient"} ParameterName */
 
@@ -17,7 +17,7 @@ export const PARAMETERS = {
 
 export const PARAMETER_NAMES = /** @type {ParameterName[]} */ (Object.keys(PARAMETERS));
 
-/** @type {(name: ParameterName) => string} a parameter's axis, in the plotting library's own small markup */
+/** @type {(name: ParameterName) => string} a parameter's axis, in the drawing's small markup */
 export function axisOf(name) {
   const { symbol, unit } = PARAMETERS[name];
   return `${symbol[0]}<sub>${symbol[1]}</sub>${unit && `, ${unit.replace(/\^([\d.]+)/, "<sup>$1</sup>")}`}`;
@@ -52,14 +52,13 @@ export function parameter({ items, name, pressure, events }) {
   const inUnit = unit && ` ${unit.replace("^0.3", "⁰·³")}`;
   const [initial, change] = [k.initial, k.change].map(({ value, sd }) => inWords(value, sd, inUnit));
   const scale = inWords(k.scale_cycles.value, k.scale_cycles.sd, " cycles");
-  const law = "%{x:,.0f} cycles<br>tracked: %{y:.4g}";
   return {
     note: `Value when new ${initial}, total change ${change}, scale ${scale}.`,
     columns: COLUMNS,
     rows: rowsOf(item),
-    figure: planar("duty cycles", { ...titled(axisOf(name)), range: rangeOf(item) }, events, (c) => [
-      ...tracked(trajectory, { name: "tracked", line: { color: c.accent, width: 2 }, text: law }, c),
-      measuredPoints("identified", measured, { color: c.ink, text: "%{x:,.0f} cycles<br>%{y:.4g}" }),
+    figure: planar("duty cycles", { title: axisOf(name), range: rangeOf(item) }, events, (c) => [
+      ...tracked(trajectory, { name: "tracked", line: { color: c.accent, width: 2 } }, c),
+      measuredPoints("identified", measured, { color: c.ink }),
     ]),
   };
 }
@@ -71,42 +70,42 @@ function inWords(value, sd, unit) {
 }
 
 /**
- * One parameter over cycles and pressure: the law as a surface, what was identified as points.
- * @type {(answers: { items: DegradationItem[], name: ParameterName }) => Spec}
+ * One parameter over cycles and pressure: isolines of the law, and a cut beside what was identified.
+ * @type {(answers: { items: DegradationItem[], name: ParameterName, cut: string | undefined }) => Spec}
  */
-export function landscape({ items, name }) {
+export function landscape({ items, name, cut }) {
   const own = items
     .flatMap((item) =>
       item.quantity === name && item.pressure_bar !== null ? [{ item, pressure: item.pressure_bar }] : [],
     )
     .sort((a, b) => a.pressure - b.pressure);
   if (own.length < 2) return { empty: "A surface needs two pressures or more." };
-  const ranges = own.map(({ item }) => rangeOf(item));
-  const [low, high] = [Math.min(...ranges.map(([from]) => from)), Math.max(...ranges.map(([, to]) => to))];
-  const points = own
-    .flatMap(({ item: { measured }, pressure }) =>
-      measured.cycles.map((at, index) => ({ at, pressure, value: measured.value[index] })),
-    )
-    .filter(({ value }) => value >= low && value <= high);
   // every pressure's law on the same cycles, those of the longest
   const laws = own.map(({ item }) => item.trajectory);
   const end = (/** @type {Trajectory} */ each) => each.cycles.at(-1) ?? 0;
-  const longest = laws.reduce((a, b) => (end(b) > end(a) ? b : a)).cycles;
-  const pressures = own.map(({ pressure }) => pressure);
-  const law = { x: longest, y: pressures, z: laws.map((each) => longest.map((at) => medianAt(each, at))) };
-  const identified = {
-    x: points.map(({ at }) => at),
-    y: points.map(({ pressure }) => pressure),
-    z: points.map(({ value }) => value),
+  const x = laws.reduce((a, b) => (end(b) > end(a) ? b : a)).cycles;
+  const measured = own.flatMap(({ item: { measured: found }, pressure }) =>
+    found.cycles.map((at, index) => ({ at, pressure, value: found.value[index] })),
+  );
+  const tracking = {
+    name: "tracked",
+    x,
+    y: own.map(({ pressure }) => pressure),
+    values: laws.map((each) => x.map((at) => medianAt(each, at))),
+    measured: {
+      x: measured.map(({ at }) => at),
+      y: measured.map(({ pressure }) => pressure),
+      z: measured.map(({ value }) => value),
+    },
   };
+  const titles = { x: "duty cycles", y: "pressure, bar", z: { title: axisOf(name) } };
+  const cuts = cutsOf([tracking], titles, cut);
   return {
-    note: `${PARAMETERS[name].title} at every pressure. Points: identified from one test each. Surface: tracked over life. Drag to turn.`,
+    note: `${PARAMETERS[name].title} at every pressure, tracked over life: lines of equal value, and along the dashed cut. Points: identified from one test each.`,
     columns: COLUMNS,
     rows: own.flatMap(({ item }) => rowsOf(item)),
-    figure: solid("duty cycles", "pressure, bar", { ...titled(axisOf(name)), range: [low, high] }, (c) => [
-      surfaceOf(law, scaleOf(c), "%{x:,.0f} cycles, %{y} bar<br>tracked: %{z:.4g}"),
-      spatialPoints(identified, 2.6, c.ink, "%{x:,.0f} cycles, %{y} bar<br>%{z:.4g}"),
-    ]),
+    cuts,
+    figure: (c) => contoured([tracking], titles, cuts, c),
   };
 }
 

@@ -1,13 +1,15 @@
-// Stribeck curves: at one pressure by state (fig. 7b) or at one state by pressure (fig. 6a), and as surfaces over pressure of one
+// Stribeck curves: at one pressure by state (fig. 7b) or at one state by pressure (fig. 6a), and as isolines over pressure of one
 // state (figs. 6b, 8) or of several (fig. 7a), or over cycles.
 
 import { fixed } from "../shared/format.js";
 import { named, pressureText, units } from "../shared/units.js";
 import { column, CYCLES, distinct, KIND, torqueColumn } from "./columns.js";
-import { faint, pressureRampOf, rampOf, scaleOf } from "./palette.js";
+import { contoured, cutsOf } from "./contours.js";
+import { pressureRampOf, rampOf } from "./palette.js";
 import { curveOf, inUnit, measuredOf, xyOf } from "./stribeck_law.js";
-import { planar, solid, spatialPoints, surfaceOf, titled } from "./traces.js";
+import { planar } from "./traces.js";
 
+/** @import { Surface } from "./contours.js" */
 /** @import { CurvePoint } from "./stribeck_law.js" */
 
 /** @typedef {{ tests: StribeckItem[], channels: Record<string, Channels>, clutch: ClutchOut, pressure?: number }} Answers channels by run */
@@ -87,9 +89,9 @@ export function flat(answers) {
     note: `${place} Points: measured. Lines: fitted.${byState && drawn.length < tests.length ? ` ${few}` : ""}`,
     columns: columnsOf(),
     rows: rowsOf(drawn),
-    figure: planar({ ...titled("sliding speed, rpm"), rangemode: "tozero" }, named(units().torque), [], (c) =>
+    figure: planar({ title: "sliding speed, rpm", zero: true }, named(units().torque), [], (c) =>
       drawn.flatMap((curve, index) =>
-        flatTraces(curve, label(curve), (byState ? rampOf : pressureRampOf)(c, index, drawn.length), c),
+        flatCurves(curve, label(curve), (byState ? rampOf : pressureRampOf)(c, index, drawn.length), c),
       ),
     ),
   };
@@ -101,31 +103,26 @@ export function curvesOfRun(run, channels, clutch) {
   return flat({ tests, by: "pressure", run: run.run_id, channels: { [run.run_id]: channels }, clutch });
 }
 
-/** @type {(curve: Drawn, name: string, color: string, c: Colours) => PlainTrace[]} */
-function flatTraces({ measured, fitted }, name, color, c) {
-  const hovertemplate = `${name}<br>%{x:.0f} rpm, %{y:.4~g} ${units().torque.unit}<extra></extra>`;
-  const shared = { legendgroup: name, name, hovertemplate };
-  const marker = { color: faint(c.panel, 1), size: 5, line: { color, width: 1.4 } };
-  return [
-    { ...shared, mode: "lines", ...xyOf(fitted), line: { color, width: 2 } },
-    { ...shared, showlegend: false, mode: "markers", ...xyOf(measured), marker },
-  ];
-}
+/** @type {(curve: Drawn, name: string, color: string, c: Colours) => Curve[]} */
+const flatCurves = ({ measured, fitted }, name, color, c) => [
+  { name, ...xyOf(fitted), line: { color } },
+  { name, ...xyOf(measured), marker: { color: c.panel, size: 5, edge: { color, width: 1.4 } } },
+];
 
 /** @typedef {"pressure" | "states" | "cycles"} Depth what a surface is over: pressure of one state or of several, or cycles */
 
 /**
  * The surface over speed and pressure of one state (figs. 6b, 8) or of several (fig. 7a), or of one pressure over speed and
- * cycles.
- * @param {Answers & { over: Depth, run: string | undefined }} answers `run`: the state
+ * cycles: isolines, and a cut.
+ * @param {Answers & { over: Depth, run: string | undefined, cut: string | undefined }} answers `run`: the state
  * @returns {Spec}
  */
 export function surface(answers) {
-  const { tests, over, pressure, run } = answers;
+  const { tests, over, pressure, run, cut } = answers;
   const byPressure = over !== "cycles";
   const picked = {
     pressure: tests.filter((test) => test.run_id === run),
-    states: spread(spread(tests), 4), // of those read for the curves as many as surfaces can be distinguished
+    states: spread(spread(tests), 4), // of those read for the curves as many as can be distinguished
     cycles: spread(tests, 9),
   };
   const drawn = drawnOf(answers, picked[over], (level) => byPressure || level === pressure);
@@ -135,52 +132,48 @@ export function surface(answers) {
   const states = distinct(drawn.map(({ cycles }) => cycles));
   const after = `After ${states.map((cycles) => fixed(cycles)).join(", ")} cycles`;
   const place = byPressure ? after : `At ${pressureText(pressure)} over the life`;
-  const drawing =
-    over === "states" ? "the fitted surface, one colour per number of cycles" : "points measured, surface fitted";
+  const several = over === "states" ? ", one colour per number of cycles" : "";
+  const titles = {
+    x: "speed, rpm",
+    y: byPressure ? "pressure, bar" : "duty cycles",
+    z: { title: named(units().torque) },
+  };
+  const groups =
+    over === "states"
+      ? states.map((cycles) => ({
+          name: `${fixed(cycles)} cycles`,
+          own: drawn.filter((curve) => curve.cycles === cycles),
+        }))
+      : [{ name: "fit", own: drawn }];
+  const surfaces = groups.map(({ name, own }) => ({ name, ...surfaceOf(own, byPressure, over !== "states") }));
+  const cuts = cutsOf(surfaces, titles, cut);
   return {
-    note: `${place}: ${drawing}. Drag to turn.`,
+    note: `${place}: lines of equal torque as fitted${several}, and torque along the dashed cut.`,
     columns: columnsOf(),
     rows: rowsOf(drawn),
-    figure: solid("speed, rpm", byPressure ? "pressure, bar" : "duty cycles", named(units().torque), (c) =>
-      over === "states"
-        ? states.map((cycles, index) => stateSurface(drawn, cycles, rampOf(c, index, states.length)))
-        : surfaceTraces(drawn, byPressure, c),
-    ),
+    cuts,
+    figure: (c) => {
+      const colour = (/** @type {number} */ index) => (several ? { color: rampOf(c, index, states.length) } : {});
+      return contoured(
+        surfaces.map((each, index) => ({ ...each, ...colour(index) })),
+        titles,
+        cuts,
+        c,
+      );
+    },
   };
 }
 
-/** @type {(drawn: Drawn[], cycles: number, color: string) => Trace} points would hide one another */
-function stateSurface(drawn, cycles, color) {
-  const own = drawn.filter((curve) => curve.cycles === cycles);
-  const at = {
-    x: xyOf(own[0].fitted).x,
-    y: own.map(({ pressure }) => pressure),
-    z: own.map(({ fitted }) => xyOf(fitted).y),
+/** @type {(drawn: Drawn[], byPressure: boolean, points: boolean) => Omit<Surface, "name">} */
+function surfaceOf(drawn, byPressure, points) {
+  const own = drawn
+    .map((curve) => ({ ...curve, depth: byPressure ? curve.pressure : curve.cycles }))
+    .sort((a, b) => a.depth - b.depth);
+  const measured = own.flatMap((curve) => curve.measured.map((point) => ({ ...point, depth: curve.depth })));
+  return {
+    x: own[0].fitted.map(({ speed }) => speed),
+    y: own.map(({ depth }) => depth),
+    values: own.map(({ fitted }) => fitted.map(({ torque }) => torque)),
+    ...(points ? { measured: { ...xyOf(measured), y: measured.map(({ depth }) => depth), z: xyOf(measured).y } } : {}),
   };
-  const text = `${fixed(cycles)} cycles<br>%{x:.0f} rpm, %{y} bar<br>fit %{z:.4~g} ${units().torque.unit}`;
-  const colorscale = /** @type {[number, string][]} */ ([0, 1].map((share) => [share, color]));
-  return surfaceOf(at, colorscale, text, 0.8);
-}
-
-/** @type {(drawn: Drawn[], byPressure: boolean, c: Colours) => Trace[]} */
-function surfaceTraces(drawn, byPressure, c) {
-  /** @param {Drawn} curve */
-  const depth = (curve) => (byPressure ? curve.pressure : curve.cycles);
-  const fitted = {
-    x: xyOf(drawn[0].fitted).x,
-    y: drawn.map(depth),
-    z: drawn.map((curve) => xyOf(curve.fitted).y),
-  };
-  const measured = {
-    x: drawn.flatMap((curve) => xyOf(curve.measured).x),
-    y: drawn.flatMap((curve) => curve.measured.map(() => depth(curve))),
-    z: drawn.flatMap((curve) => xyOf(curve.measured).y),
-  };
-  const scale = scaleOf(c);
-  const turned = /** @type {typeof scale} */ (scale.map(([at], index) => [at, scale[scale.length - 1 - index][1]]));
-  const { unit } = units().torque;
-  return [
-    surfaceOf(fitted, turned, `%{x:.0f} rpm, %{y}<br>fit %{z:.4~g} ${unit}`),
-    spatialPoints(measured, 2.2, c.ink, `%{x:.0f} rpm<br>measured %{z:.4~g} ${unit}`),
-  ];
 }

@@ -1,137 +1,83 @@
-// The traces that several charts draw: bands between two edges, and points or lines with error bars.
+// The curves that several charts draw: bands between two edges, points or lines with error bars, and events as marks.
 
 import { pressureText } from "../shared/units.js";
 import { distinct, HALF_OF_90 } from "./columns.js";
-import { eventMarks } from "./layout.js";
 import { faint, pressureRampOf } from "./palette.js";
-
-/** @typedef {(number | null)[]} Values */
-/** @typedef {{ x: Values, y: Values }} Places */
-
-/** @type {(text: string) => { title: { text: string } }} the title of an axis */
-export const titled = (text) => ({ title: { text } });
 
 /** @typedef {string | Axis} Titled an axis, by its title where it has nothing else */
 
-/** @param {Titled} axis */
-const axisOf = (axis) => (typeof axis === "string" ? titled(axis) : axis);
+/** @type {(axis: Titled) => Axis} */
+const axisOf = (axis) => (typeof axis === "string" ? { title: axis } : axis);
 
 /**
  * A figure over one pair of axes, with events marked.
- * @type {(x: Titled, y: Titled, events: Receipt[], traces: (c: Colours) => Trace[]) => (c: Colours) => Figure}
+ * @type {(x: Titled, y: Titled, events: Receipt[], curves: (c: Colours) => Curve[]) => (c: Colours) => Figure}
  */
-export const planar = (x, y, events, traces) => (c) => ({
-  data: traces(c),
-  layout: { xaxis: axisOf(x), yaxis: axisOf(y), ...eventMarks(events, c) },
-});
+export const planar = (x, y, events, curves) => (c) => [
+  { x: axisOf(x), y: axisOf(y), curves: curves(c), marks: eventMarks(events, c) },
+];
 
-/** @type {(x: string, y: string, z: Titled, traces: (c: Colours) => Trace[]) => (c: Colours) => Figure} one in 3D */
-export const solid = (x, y, z, traces) => (c) => ({
-  data: traces(c),
-  layout: { showlegend: false, scene: { xaxis: titled(x), yaxis: titled(y), zaxis: axisOf(z) } },
-});
+/** @type {(events: Receipt[], c: Colours) => Mark[]} lines with names */
+export const eventMarks = (events, c) =>
+  events.map(({ cycles: x, event, note }) => {
+    const text = event === "other" && note ? plainNote(note) : (event ?? "").replaceAll("_", " ");
+    return { x, line: { color: c.maintenance, width: 1.5, dash: "dot" }, text, turned: true };
+  });
+
+/** @param {string} note in which nothing may look like the drawing's small markup */
+const plainNote = (note) => note.replaceAll("<", "‹").replaceAll(">", "›").slice(0, 40);
+
+/** @type {(name: string, lower: Places, upper: Places, c: Colours, color?: string) => Curve} between two edges */
+export const band = (name, lower, upper, c, color = c.accent) => ({ ...upper, name, lower, fill: faint(color, 0.2) });
 
 /**
- * A band between two edges, each with its own abscissae.
- * @param {string} name
- * @type {(name: string, lower: Places, upper: Places, c: Colours, color?: string) => PlainTrace[]}
- */
-export function band(name, lower, upper, c, color = c.accent) {
-  /** @type {Omit<PlainTrace, "x" | "y">} */
-  const edge = { mode: "lines", line: { width: 0 }, hoverinfo: "skip", showlegend: false };
-  const fillcolor = faint(color, 0.2);
-  return [
-    { ...edge, ...lower },
-    { ...edge, ...upper, fill: "tonexty", fillcolor, name, showlegend: name !== "" },
-  ];
-}
-
-/** @type {(name: string, at: Places, line: Line, text: string, more?: Partial<PlainTrace>) => PlainTrace} */
-export const lineOf = (name, at, line, text, more = {}) => ({
-  name,
-  mode: "lines",
-  ...at,
-  line,
-  hovertemplate: `${text}<extra></extra>`,
-  ...more,
-});
-
-/**
- * A course and its 90 % band; `text` is shown under the pointer.
+ * A course and its 90 % band.
  * @param {{ cycles: number[], lower: number[], median: number[], upper: number[] }} course
- * @param {{ name: string, band?: string, line: Line, text: string }} look
+ * @param {{ name: string, band?: string, line: Line }} look
  * @param {Colours} c
+ * @returns {Curve[]}
  */
-export function tracked({ cycles: x, lower, median, upper }, { name, band: edges = "90 % band", line, text }, c) {
-  return [
-    ...band(edges, { x, y: lower }, { x, y: upper }, c, line.color),
-    lineOf(name, { x, y: median }, line, text, { showlegend: x.length > 0 }),
-  ];
+export function tracked({ cycles: x, lower, median, upper }, { name, band: edges = "90 % band", line }, c) {
+  if (x.length === 0) return [];
+  return [band(edges, { x, y: lower }, { x, y: upper }, c, line.color), { name, x, y: median, line }];
 }
-
-/** @typedef {{ color: string, text: string, size?: number, thickness?: number, bars?: number }} PointLook `text`: under the pointer */
 
 /**
  * Points with bars that span the 90 % interval, over cycles or what stands in their place; a deviation that is null has none.
- * @type {(name: string, measured: { cycles: number[], value: number[], sd: (number | null)[] }, look: PointLook) => PlainTrace}
+ * @type {(name: string, measured: { cycles: number[], value: number[], sd: (number | null)[] }, marker: Marker) => Curve}
  */
-export const measuredPoints = (name, measured, { color, text, size = 6, thickness = 1.1, bars = 3 }) => ({
+export const measuredPoints = (name, { cycles, value, sd }, marker) => ({
   name,
-  mode: "markers",
-  x: measured.cycles,
-  y: measured.value,
-  marker: { color, size },
-  error_y: { type: "data", array: measured.sd.map((sd) => HALF_OF_90 * (sd ?? 0)), color, thickness, width: bars },
-  hovertemplate: `${text}<extra></extra>`,
+  x: cycles,
+  y: value,
+  marker,
+  half: sd.map((each) => HALF_OF_90 * (each ?? 0)),
 });
-
-/** @typedef {{ x: Values, y: Values, z: Values | Values[] }} Spatial */
-
-/** @type {(at: Spatial, colorscale: [number, string][], text: string, opacity?: number) => Trace} a surface in 3D */
-export const surfaceOf = (at, colorscale, text, opacity = 0.86) => ({
-  type: "surface",
-  ...at,
-  colorscale,
-  opacity,
-  showscale: false,
-  hovertemplate: `${text}<extra></extra>`,
-});
-
-/** @type {(at: Spatial, size: number, color: string, text: string) => Trace} points in 3D */
-export const spatialPoints = (at, size, color, text) => ({
-  type: "scatter3d",
-  mode: "markers",
-  ...at,
-  marker: { size, color },
-  hovertemplate: `${text}<extra></extra>`,
-});
-
-/** @typedef {{ size: number, bars: number, text: string }} Look `text`: under the pointer */
 
 /**
  * A line with points and error bars.
- * @type {(name: string, values: { x: number, value: number, sd: number | null }[], look: Look, color: string) => PlainTrace}
+ * @type {(name: string, values: { x: number, value: number, sd: number | null }[], marker: Marker) => Curve}
  */
-export function measuredLine(name, values, look, color) {
-  const [cycles, value] = [values.map(({ x }) => x), values.map((each) => each.value)];
-  const measured = { cycles, value, sd: values.map(({ sd }) => sd) };
-  const points = measuredPoints(name, measured, { color, thickness: 1, ...look });
-  return { ...points, mode: "lines+markers", line: { color, width: 1.4 } };
+export function measuredLine(name, values, marker) {
+  const measured = {
+    cycles: values.map(({ x }) => x),
+    value: values.map(({ value }) => value),
+    sd: values.map(({ sd }) => sd),
+  };
+  return { ...measuredPoints(name, measured, marker), line: { color: marker.color, width: 1.4 } };
 }
 
 /**
  * A line with points and error bars for each pressure, over cycles.
  * @param {{ cycles: number, pressure: number, value: number, sd: number | null }[]} values
- * @param {Look} look
+ * @param {number} size of points, px
  * @param {Colours} c
  */
-export function linesByPressure(values, { text, ...look }, c) {
+export function linesByPressure(values, size, c) {
   const pressures = distinct(values.map(({ pressure }) => pressure));
   return pressures.map((level, index) => {
     const own = values.filter(({ pressure }) => pressure === level);
     const points = own.map(({ cycles, value, sd }) => ({ x: cycles, value, sd }));
-    const name = pressureText(level);
-    const under = `%{x:,.0f} cycles, ${name}<br>${text}`;
-    return measuredLine(name, points, { ...look, text: under }, pressureRampOf(c, index, pressures.length));
+    return measuredLine(pressureText(level), points, { size, color: pressureRampOf(c, index, pressures.length) });
   });
 }

@@ -1,6 +1,4 @@
-// What charts are made of, as far as these pages use it: what a chart shows, the plotting library's data and layout, and the
-// little of the library itself that is called. For the checks alone, which know these types in
-// every module; browsers never load this file.
+// What charts are made of. For the checks alone, which know these types in every module; browsers never load this file.
 
 type Cell = string | number | null | undefined;
 
@@ -10,143 +8,88 @@ interface Column {
   text?: (value: number) => string;
 }
 
-/** What a chart shows: a drawing with its table, or what is missing and how to get it. */
+/** What a chart shows: a drawing with its table, or what is missing and how to get it; `cuts`: through a surface, and the one shown. */
 type Spec =
-  | { empty: string; note?: undefined; columns?: undefined; rows?: undefined; figure?: undefined }
-  | { empty?: undefined; note: string; columns: Column[]; rows: Cell[][]; figure: (colours: Colours) => Figure };
+  | { empty: string; note?: undefined; columns?: undefined; rows?: undefined; figure?: undefined; cuts?: undefined }
+  | {
+      empty?: undefined;
+      note: string;
+      columns: Column[];
+      rows: Cell[][];
+      figure: (colours: Colours) => Figure;
+      cuts?: { options: [string, string][]; chosen: string };
+    };
 
 /** Colours as CSS. */
 type Colours = Record<(typeof import("./palette.js").NAMES)[number], string>;
 type Scheme = "light" | "dark" | null;
+type Values = (number | null)[];
+type Places = { x: Values; y: Values };
+type Span = [number, number];
 
-interface Figure {
-  data: Trace[];
-  layout: Layout;
+/** Panels beside each other, below each other where there is no room. */
+type Figure = Panel[];
+
+interface Panel {
+  title?: string;
+  x: Axis;
+  y: Axis;
+  curves: Curve[];
+  fields?: Field[];
+  marks?: Mark[];
+}
+
+/** `zero`: from zero on; `names`: categories at 0, 1, 2, ... */
+interface Axis {
+  title: string;
+  range?: Span;
+  zero?: boolean;
+  log?: boolean;
+  names?: string[];
 }
 
 interface Line {
-  color?: string;
+  color: string;
   width?: number;
-  dash?: string;
+  dash?: "dash" | "dot";
 }
 
 interface Marker {
-  color?: string;
-  size: number;
-  line?: { color: string; width: number };
-}
-
-interface ErrorBars {
-  type: "data";
-  array: number[];
   color: string;
-  thickness: number;
-  width: number;
+  size?: number;
+  edge?: { color: string; width: number };
 }
 
-/** Lines, points or a band over one pair of axes: what can be drawn without the library. */
-interface PlainTrace {
-  type?: "scatter";
-  mode: string;
-  x: (number | null)[];
-  y: (number | null)[];
+/** A line, points or both; `half`: of error bars; with `lower` a band between two edges; `silent`: not read out. */
+interface Curve extends Places {
   name?: string;
   line?: Line;
   marker?: Marker;
-  error_y?: ErrorBars;
-  fill?: "tonexty";
-  fillcolor?: string;
-  showlegend?: boolean;
-  legendgroup?: string;
-  hoverinfo?: "skip";
-  hovertemplate?: string;
-  xaxis?: string;
-  yaxis?: string;
+  half?: number[];
+  lower?: Places;
+  fill?: string;
+  silent?: boolean;
 }
 
-interface OtherTrace {
-  type: "surface" | "scatter3d" | "heatmap";
-  [name: string]: unknown;
+/** Values over a grid: coloured cells, or isolines at `levels`, filled where `fill` is given; `z`: what the values are. */
+interface Field {
+  name?: string;
+  z: string;
+  x: number[];
+  y: number[];
+  values: Values[];
+  levels?: number[];
+  fill?: (value: number) => string;
+  line?: string;
 }
 
-type Trace = PlainTrace | OtherTrace;
-type Span = [number, number];
-
-interface Axis {
-  title?: { text?: string; standoff?: number; font?: { size: number } };
-  range?: Span;
-  rangemode?: "tozero";
-  [name: string]: unknown;
-}
-
-/** A line; `paper` counts from 0 to 1 over the whole chart. */
-interface Shape {
-  type: "line";
-  x0: number;
-  x1: number;
-  y0: number;
-  y1: number;
-  xref?: "paper";
-  yref?: "paper";
-  line: Required<Line>;
-}
-
-interface Annotation {
-  x: number;
-  y: number;
-  xref?: "paper";
-  yref?: "paper";
-  xanchor?: string;
-  yanchor?: string;
+/** A line over the whole panel at one x or y, with a text beside it; `turned`: along the line. */
+interface Mark {
+  x?: number;
+  y?: number;
+  line: Line;
   text: string;
-  textangle?: number;
-  showarrow: false;
-  font?: { size: number; color: string };
-}
-
-/** A chart's own layout. */
-interface Layout {
-  xaxis?: Axis;
-  yaxis?: Axis;
-  scene?: Record<"xaxis" | "yaxis" | "zaxis", Axis>;
-  shapes?: Shape[];
-  annotations?: Annotation[];
-  margin?: Partial<WholeLayout["margin"]>;
-  [name: string]: unknown;
-}
-
-/** A layout with all that the house adds. */
-interface WholeLayout extends Layout {
-  font: { family: string; size: number; color: string };
-  margin: Record<"l" | "r" | "t" | "b", number>;
-  legend: { font: { size: number }; [name: string]: unknown };
-  paper_bgcolor: string;
-  template: { layout: Record<"xaxis" | "yaxis", { gridcolor: string; linecolor: string }> & { scene: object } };
-}
-
-interface WholeFigure {
-  data: Trace[];
-  layout: WholeLayout;
-}
-
-interface Tick {
-  at: number;
-  text: string;
-}
-
-interface LegendEntry {
-  trace: PlainTrace;
-  width: number;
-  x: number;
-  y: number;
-}
-
-/** A figure whose axes, ticks and legend have their places before anything is drawn. */
-interface SettledFigure {
-  data: PlainTrace[];
-  layout: WholeLayout & Record<"xaxis" | "yaxis", Axis & { range: Span }>;
-  ticks: Record<"x" | "y", Tick[]>;
-  legend: { entries: LegendEntry[]; top: number };
+  turned?: boolean;
 }
 
 interface Size {
@@ -154,12 +97,46 @@ interface Size {
   height: number;
 }
 
-/** What is called of the plotting library. */
-interface Plotting {
-  react(place: HTMLElement, data: Trace[], layout: Layout, config: object): Promise<unknown>;
-  purge(place: HTMLElement): void;
-  toImage(figure: HTMLElement | Figure, options: Size & { format: "png"; scale: number }): Promise<string>;
+interface Tick {
+  at: number;
+  text: string;
 }
 
-/** Set by plotly.min.js. */
-declare var Plotly: Plotting | undefined;
+/** From data to px and back. */
+interface Scale {
+  axis: Axis;
+  range: Span;
+  to: (value: number) => number;
+  from: (px: number) => number;
+  ticks: Tick[];
+}
+
+/** A panel with its place: the corner of its cell, of its axes, and their size. */
+interface Frame {
+  panel: Panel;
+  left: number;
+  l: number;
+  t: number;
+  bottom: number;
+  inside: Size;
+  x: Scale;
+  y: Scale;
+}
+
+interface LegendEntry {
+  curve: Curve;
+  width: number;
+  x: number;
+  y: number;
+}
+
+/** A figure whose axes, ticks and legend have their places. */
+interface Framed {
+  frames: Frame[];
+  legend: LegendEntry[];
+  size: Size;
+  font: { size: number; family: string };
+}
+
+/** The part of its axes that a panel shows; none: all. */
+type Zoom = { x: Span; y: Span } | undefined;

@@ -5,11 +5,10 @@
 import { diagnosisTab } from "../diagnosis/diagnosis.js";
 import { alarms } from "../alarms/alarms.js";
 import { pollRaised } from "../alarms/raised.js";
-import { painted } from "../charts/plotting.js";
 import { engagementsTab } from "../engagements/engagements.js";
 import { sender } from "../sending/taking.js";
 import { at, Problem, read } from "../shared/api.js";
-import { button, byId, h, showTab } from "../shared/dom.js";
+import { button, byId, h, markShown, showTab } from "../shared/dom.js";
 import { Live } from "../shared/live.js";
 import { placeUnits } from "../shared/units.js";
 import { askArchive, askEnd, askTakeBack, showDone } from "./changes.js";
@@ -127,7 +126,7 @@ function drawHead(clutch) {
     refresh,
   };
   byId("head").replaceChildren(...head(clutch, asks));
-  painted().then(() => performance.mark("head-shown"));
+  markShown("head-shown");
   const back = button("Bring it back …", () => done(askArchive(ID, false)));
   const text = "This clutch is archived: it is not in the list of clutches and accepts no new runs.";
   byId("archived").replaceChildren(clutch.archived ? h("div.notice", h("p", text), back) : "");

@@ -1,4 +1,4 @@
-// The tab of the Stribeck curves: curves by state or pressure, in 3D, and their four parameters over cycles and pressure.
+// The tab of the Stribeck curves: curves by state or pressure, as isolines, and their four parameters over cycles and pressure.
 
 import { Chart, chooser, setControls } from "../charts/chart.js";
 import { landscape, parameter, PARAMETER_NAMES, PARAMETERS } from "../charts/parameters.js";
@@ -25,7 +25,7 @@ const DEPTHS = [
   ["cycles", "cycles, at one pressure"],
 ];
 /** @typedef {{ pressure?: number, run?: string, by: "state" | "pressure", over: Depth }} OfCurves */
-/** @typedef {OfCurves & { lawRun?: string, parameter: ParameterName, law: ParameterName }} Chosen */
+/** @typedef {OfCurves & { cut?: string, lawRun?: string, parameter: ParameterName, law: ParameterName, parameterCut?: string }} Chosen */
 
 const NAMES = optionsOf(PARAMETERS);
 
@@ -33,13 +33,13 @@ const NAMES = optionsOf(PARAMETERS);
 export function curvesTab({ reader }) {
   const { name } = reader;
   const curves = new Chart({ name, id: "stribeck", title: "Stribeck curves", height: 440 });
-  const spatial = new Chart({ name, id: "surface", title: "Stribeck curves in 3D", spatial: true, height: 440 });
+  const spatial = new Chart({ name, id: "surface", title: "Lines of equal torque", wide: true, height: 400 });
   const parameters = PARAMETER_NAMES.map((key) => {
     const { title, symbol: letter } = PARAMETERS[key];
     return { key, chart: new Chart({ name, id: key.replaceAll("_", "-"), title, letter, height: 300 }) };
   });
-  const overAll = { id: "landscape", title: "A parameter over cycles and pressure", spatial: true, wide: true };
-  const whole = new Chart({ name, ...overAll, height: 440 });
+  const overAll = { id: "landscape", title: "A parameter over cycles and pressure", wide: true };
+  const whole = new Chart({ name, ...overAll, height: 400 });
   const law = new Chart({ name, id: "pressure-law", title: "A parameter over pressure", height: 360 });
   byId("stribeck-charts").append(curves.element, spatial.element);
   const below = [...parameters.map(({ chart }) => chart), whole, law];
@@ -49,9 +49,11 @@ export function curvesTab({ reader }) {
   /** @type {Chosen} */
   const chosen = { by: "state", over: "pressure", parameter: "static_torque_nm", law: "static_torque_nm" };
   const choose = chooser(chosen, (what) => {
-    if (["pressure", "run", "by", "over"].includes(what)) drawCurves();
-    if (["pressure", "lawRun", "parameter", "law"].includes(what)) drawParameters();
+    if (["pressure", "run", "by", "over", "cut"].includes(what)) drawCurves();
+    if (["pressure", "lawRun", "parameter", "law", "parameterCut"].includes(what)) drawParameters();
   });
+  /** @type {(name: "cut" | "parameterCut", spec: Spec) => HTMLElement[]} */
+  const cutsOf = (name, { cuts }) => (cuts ? [choose(name, "Cut at", cuts.options, cuts.chosen)] : []);
   const pressure = () => usual(pressuresOf(answers.tests), chosen.pressure);
   const level = () => choose("pressure", "Pressure", levelOptions(pressuresOf(answers.tests)), pressure());
 
@@ -68,9 +70,10 @@ export function curvesTab({ reader }) {
     const present = tests.length > 0;
     setControls(curves, present ? [choose("by", "Colour by", BY), by === "state" ? level() : state()] : []);
     curves.show(flat({ ...shared, by }));
+    const lines = surface({ ...shared, over, cut: chosen.cut });
     const controls = () => [choose("over", "Torque over speed and", DEPTHS), ...more.map((each) => each())];
-    setControls(spatial, present ? controls() : []);
-    spatial.show(surface({ ...shared, over }));
+    setControls(spatial, present ? [...controls(), ...cutsOf("cut", lines)] : []);
+    spatial.show(lines);
   }
 
   function drawParameters() {
@@ -79,8 +82,9 @@ export function curvesTab({ reader }) {
       setControls(chart, tests.length > 0 ? [level()] : []);
       chart.show(parameter({ items, events, name: key, pressure: pressure() }));
     }
-    setControls(whole, [choose("parameter", "Parameter", NAMES)]);
-    whole.show(landscape({ items, name: chosen.parameter }));
+    const lines = landscape({ items, name: chosen.parameter, cut: chosen.parameterCut });
+    setControls(whole, [choose("parameter", "Parameter", NAMES), ...cutsOf("parameterCut", lines)]);
+    whole.show(lines);
     const test = tests.find(({ run_id: id }) => id === chosen.lawRun) ?? tests[0];
     const state = choose("lawRun", "Cycles", stateOptions(tests), test?.run_id);
     setControls(law, tests.length > 0 ? [choose("law", "Parameter", NAMES), state] : []);

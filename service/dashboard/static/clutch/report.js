@@ -20,7 +20,7 @@ const COLUMNS = ["Cycles", "Test", "Mean COF, measured", "Fits acceptable"];
  * @param {{ clutch: ClutchOut, life?: RemainingLife, tests?: StribeckItem[], events?: Receipt[], charts?: Chart[] }} answers
  */
 export function makeReport(place, { clutch, life, tests = [], events = [], charts = [] }) {
-  const drawings = charts.map((chart) => chart.light({ width: 760, height: 255, scheme: "light" }));
+  const drawn = charts.filter(({ spec }) => spec?.figure).map((chart) => chart.light({ width: 760, height: 255 }));
   const { state, headline, action } = clutch;
   const simulated = clutch.origin === "simulated" ? ", simulated" : "";
   const kind = `Wet clutch, ${clutch.friction_material} on ${clutch.reaction_plate}, ${clutch.fluid}${simulated}`;
@@ -38,7 +38,7 @@ export function makeReport(place, { clutch, life, tests = [], events = [], chart
     h("p.state", stateIcon(state.name), h("span", headline)),
     h("p.action", action),
     h("dl.facts", values),
-    ...drawings.flatMap((src) => (src === null ? [] : [h("img", { src, alt: "" })])),
+    ...drawn,
     h("p", h("b", "Diagnosis: "), diagnosisText(clutch.diagnosis)),
     last.length > 0 ? table("The last tests", COLUMNS, last.map(testRow), { shown: true }) : "",
     done.length > 0 ? h("p", h("b", "Events: "), done.join("; ")) : "",

@@ -5,7 +5,7 @@ import { column } from "../charts/columns.js";
 import { pressureRampOf } from "../charts/palette.js";
 import { curvesOfRun } from "../charts/stribeck.js";
 import { measuredOf, torqueAtSpeed } from "../charts/stribeck_law.js";
-import { planar, titled } from "../charts/traces.js";
+import { planar } from "../charts/traces.js";
 import { h } from "../shared/dom.js";
 import { fixed, quantity } from "../shared/format.js";
 import { named, pressureText, units } from "../shared/units.js";
@@ -55,14 +55,12 @@ function residualsOf({ fits }, channels, clutch) {
       { name: titles[1], text: (value) => fixed(value, torque.decimals + 1) },
     ],
     rows: levels.flatMap(({ level, points }) => points.map(({ speed, left }) => [level, speed, left])),
-    figure: planar({ ...titled(titles[0]), rangemode: "tozero" }, titles[1], [], (c) =>
+    figure: planar({ title: titles[0], zero: true }, titles[1], [], (c) =>
       levels.map(({ level, points }, index) => ({
         name: pressureText(level),
-        mode: "markers",
         x: points.map(({ speed }) => speed),
         y: points.map(({ left }) => left),
         marker: { color: pressureRampOf(c, index, levels.length), size: 5 },
-        hovertemplate: `%{x:.0f} rpm<br>%{y:.3g} ${torque.unit}<extra></extra>`,
       })),
     ),
   };
@@ -84,11 +82,10 @@ function recordOf(channels, channel) {
     figure: planar(along, quantity(channel), [], (c) => [
       {
         name: quantity(channel),
-        mode: time ? "lines" : "lines+markers",
         x,
         y: values,
         line: { color: c.accent, width: 1.2 },
-        marker: { size: 4 },
+        ...(time ? {} : { marker: { color: c.accent, size: 4 } }),
       },
     ]),
   };

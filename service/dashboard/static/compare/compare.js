@@ -8,7 +8,7 @@ import { column, CYCLES, KIND } from "../charts/columns.js";
 import { PARAMETER_NAMES } from "../charts/parameters.js";
 import { spread } from "../charts/stribeck.js";
 import { curveOf, highestOf, xyOf } from "../charts/stribeck_law.js";
-import { planar, titled } from "../charts/traces.js";
+import { planar } from "../charts/traces.js";
 import { levelsOf, optionsOf, QUANTITIES, titleOf, usual } from "../quantities/names.js";
 import { clutchPath, read, readAll } from "../shared/api.js";
 import { button, byId, form, h } from "../shared/dom.js";
@@ -25,7 +25,7 @@ const CHOICES = optionsOf(QUANTITIES, ["mean_cof", ...PARAMETER_NAMES]);
 const VALUES = Object.entries({ share: "normalised to new", measured: "as measured" });
 /** How many states of a life are drawn. */
 const STATES = 3;
-const DASHES = ["solid", "dash", "dot"];
+const DASHES = /** @type {const} */ ([undefined, "dash", "dot"]);
 const name = () => "comparison";
 const overLife = new Chart({ name, id: "over-life", title: "Over the cycles of each life", wide: true, height: 400 });
 const title = "Stribeck curves, first, middle and last test";
@@ -111,8 +111,8 @@ function overLifeOf(lives, quantity, share) {
       drawn.flatMap(({ label, points, line }, index) => {
         const color = palette(c)[index % 6];
         return [
-          { name: label, mode: "lines", ...line, line: { color, width: 2 } },
-          { name: label, showlegend: line.x.length === 0, mode: "markers", ...points, marker: { color, size: 6 } },
+          ...(line.x.length > 0 ? [{ name: label, ...line, line: { color } }] : []),
+          { name: label, ...points, marker: { color } },
         ];
       }),
     ),
@@ -146,12 +146,11 @@ function curvesOf(lives, share) {
     note: "Fitted curves, one colour per life: solid for the first test, dashed for the middle one, dotted for the last.",
     columns: [{ name: "curve" }, column("speed, rpm"), column(axis, 4)],
     rows: drawn.flatMap((curve) => curve.points.map((point) => [curve.name, point.speed, point.torque])),
-    figure: planar({ ...titled("sliding speed, rpm"), rangemode: "tozero" }, axis, [], (c) =>
+    figure: planar({ title: "sliding speed, rpm", zero: true }, axis, [], (c) =>
       drawn.map(({ name: curve, index, state, points }) => ({
         name: curve,
-        mode: "lines",
         ...xyOf(points),
-        line: { color: palette(c)[index % 6], width: 2, ...(state > 0 ? { dash: DASHES[state] } : {}) },
+        line: { color: palette(c)[index % 6], dash: DASHES[state] },
       })),
     ),
   };

@@ -1,15 +1,14 @@
 // The residuals between data and model, before and after the extension; and the loops under both.
 
 import { Chart } from "../charts/chart.js";
-import { column } from "../charts/columns.js";
-import { titled } from "../charts/traces.js";
+import { column, HALF_OF_90 } from "../charts/columns.js";
+import { blend } from "../charts/palette.js";
+import { band } from "../charts/traces.js";
 import { fixed, significant } from "../shared/format.js";
 
 /** @typedef {"before" | "after"} Side */
 
 /** @typedef {{ id: string, key: "speed_pressure" | "pressure_cycles", x: "speed_rpm" | "cycles", xName: string }} ResidualsMap */
-
-const NARROW = matchMedia("(max-width: 600px)");
 
 /** @type {ResidualsMap[]} */
 const MAPS = [
@@ -47,74 +46,32 @@ function mapSpec(maps, map) {
     note: "Mean of measured minus predicted torque, in standard deviations of the noise (σ). Pure noise stays pale. Both pictures use the same scale.",
     columns: [{ name: "model" }, column(xName), column(PRESSURE, 2), column("residual, sigma", 2)],
     rows: sides.flatMap(({ side, z }) => z.flatMap((row, j) => row.map((value, i) => [side, xs[i], ys[j], value]))),
-    figure: (c) => ({
-      data: heatmaps(sides, { xs, ys, xName }, c),
-      layout: mapLayout(sides, xName),
-    }),
+    figure: (c) => heatmaps(sides, { xs, ys, xName }, c),
   };
 }
 
 /**
+ * One or two maps beside each other, on one scale of colours.
  * @param {{ side: Side, z: Table }[]} sides
  * @param {{ xs: number[], ys: number[], xName: string }} axes
  * @param {Colours} c
- * @returns {Trace[]}
+ * @returns {Figure}
  */
 function heatmaps(sides, { xs, ys, xName }, c) {
   const magnitudes = sides.flatMap(({ z }) => z.flat().flatMap((value) => (value === null ? [] : [Math.abs(value)])));
   const most = Math.max(1, ...magnitudes);
-  return sides.map(({ side, z }, index) => ({
-    type: "heatmap",
-    x: xs.map((value) => fixed(value)),
-    y: ys.map((value) => significant(value, 3)),
-    z,
-    zmin: -most,
-    zmax: most,
-    xaxis: index ? "x2" : "x",
-    yaxis: "y",
-    xgap: 1,
-    ygap: 1,
-    colorscale: [
-      [0, c.fresh],
-      [0.5, c.panel],
-      [1, c.worn],
-    ],
-    showscale: index === sides.length - 1,
-    colorbar: { ...titled("σ"), thickness: 12, outlinewidth: 0 },
-    hovertemplate: `${side}<br>${xName} %{x}<br>${PRESSURE} %{y}<br>%{z:.2f} σ<extra></extra>`,
+  const fill = (/** @type {number} */ value) => blend([c.fresh, c.panel, c.worn], 0.5 + value / (2 * most));
+  const scale = [-most, -most / 2, most / 2, most].map((value) => ({
+    ...band(`${significant(value, 2)} σ`, { x: [], y: [] }, { x: [], y: [] }, c),
+    fill: fill(value),
   }));
-}
-
-/** @type {(sides: { side: Side }[], xName: string) => Layout} one or two maps beside each other, each under its name */
-function mapLayout(sides, xName) {
-  const two = sides.length > 1;
-  /** @type {(domain: [number, number]) => Axis} */
-  const abscissa = (domain) => ({
-    ...titled(xName),
-    domain,
-    type: "category",
-    nticks: NARROW.matches ? 3 : 5,
-    tickangle: 0,
-    showgrid: false,
-  });
-  const middles = two ? [0.24, 0.76] : [0.5];
-  return {
-    grid: { rows: 1, columns: sides.length },
-    hovermode: "closest",
-    xaxis: abscissa(two ? [0, 0.48] : [0, 1]),
-    ...(two ? { xaxis2: abscissa([0.52, 1]) } : {}),
-    yaxis: { ...titled(PRESSURE), type: "category", showgrid: false },
-    margin: { t: 30 },
-    annotations: sides.map(({ side }, index) => ({
-      text: `<b>${side}</b>`,
-      x: middles[index],
-      xref: "paper",
-      y: 1,
-      yref: "paper",
-      yanchor: "bottom",
-      showarrow: false,
-    })),
-  };
+  return sides.map(({ side, z }) => ({
+    title: side,
+    x: { title: xName, names: xs.map((value) => fixed(value)) },
+    y: { title: PRESSURE, names: ys.map((value) => significant(value, 3)) },
+    curves: scale,
+    fields: [{ z: "residual, σ", x: [...xs.keys()], y: [...ys.keys()], values: z, fill }],
+  }));
 }
 
 /** @type {(z: Table, ys: number[]) => Table} rows and columns exchanged */
@@ -123,7 +80,7 @@ const turned = (z, ys) => ys.map((_, j) => z.map((row) => row[j] ?? null));
 /** @type {(curves: LawCurveOut[]) => Spec | null} measured friction curves beside eq. 3 and the law as found */
 function lawSpec(curves) {
   if (curves.length === 0) return null;
-  const shown = NARROW.matches ? curves.slice(0, 1) : [...new Set([curves[0], curves.at(-1)])].flatMap((c) => c ?? []);
+  const shown = [...new Set([curves[0], curves.at(-1)])].flatMap((c) => c ?? []);
   return {
     note: `${shown.map(curveName).join(" · ")}. The band holds the law with a probability of 90 %.`,
     columns: [
@@ -138,57 +95,28 @@ function lawSpec(curves) {
         ...[curve.measured_nm, curve.eq3_nm, curve.law_nm, curve.law_sd_nm].map((values) => values[at]),
       ]),
     ),
-    figure: (c) => ({
-      data: shown.flatMap((curve, place) => lawTraces(curve, place, c)),
-      layout: {
-        grid: { rows: 1, columns: shown.length, pattern: "independent", xgap: 0.12 },
-        ...Object.fromEntries(
-          shown.flatMap((_, place) => [
-            [`xaxis${suffix(place)}`, { ...titled("speed, rpm"), type: "log" }],
-            [`yaxis${suffix(place)}`, titled(place ? "" : "torque, Nm")],
-          ]),
-        ),
-      },
-    }),
+    figure: (c) =>
+      shown.map((curve) => ({
+        title: curveName(curve),
+        x: { title: "speed, rpm", log: true },
+        y: { title: "torque, Nm" },
+        curves: lawCurves(curve, c),
+      })),
   };
 }
 
 /** @type {(curve: LawCurveOut) => string} */
 const curveName = ({ cycles, pressure_bar: pressure }) => `${fixed(cycles)} cycles, ${fixed(pressure, 1)} bar`;
 
-/** @type {(curve: LawCurveOut, place: number, c: Colours) => PlainTrace[]} */
-function lawTraces(curve, place, c) {
-  const axes = { x: curve.speed_rpm, xaxis: `x${suffix(place)}`, yaxis: `y${suffix(place)}` };
-  const legend = { showlegend: place === 0 };
-  /** @type {(sign: number) => (number | null)[]} */
-  const end = (sign) => curve.law_nm.map((torque, at) => (torque ?? 0) + sign * 1.645 * (curve.law_sd_nm[at] ?? 0));
-  const edge = {
-    ...axes,
-    mode: "lines",
-    line: { width: 0, color: c.accent },
-    showlegend: false,
-    hoverinfo: /** @type {const} */ ("skip"),
-  };
+/** @type {(curve: LawCurveOut, c: Colours) => Curve[]} */
+function lawCurves({ speed_rpm: x, measured_nm: measured, eq3_nm: eq3, law_nm: law, law_sd_nm: sd }, c) {
+  /** @type {(sign: number) => Places} */
+  const edge = (sign) => ({ x, y: law.map((torque, at) => (torque ?? 0) + sign * HALF_OF_90 * (sd[at] ?? 0)) });
   return [
-    { ...edge, y: end(-1) },
-    { ...edge, y: end(1), fill: "tonexty", fillcolor: `${c.accent}33` },
-    {
-      ...axes,
-      ...legend,
-      name: "measured",
-      y: curve.measured_nm,
-      mode: "markers",
-      marker: { size: 4, color: c.quiet },
-    },
-    {
-      ...axes,
-      ...legend,
-      name: "eq. 3",
-      y: curve.eq3_nm,
-      mode: "lines",
-      line: { width: 2, color: c.worn, dash: "dash" },
-    },
-    { ...axes, ...legend, name: "law as found", y: curve.law_nm, mode: "lines", line: { width: 2, color: c.accent } },
+    band("", edge(-1), edge(1), c),
+    { name: "measured", x, y: measured, marker: { size: 4, color: c.quiet } },
+    { name: "eq. 3", x, y: eq3, line: { color: c.worn, dash: "dash" } },
+    { name: "law as found", x, y: law, line: { color: c.accent } },
   ];
 }
 
@@ -199,11 +127,7 @@ const KINDS = /** @type {const} */ (["measured", "baseline", "extended"]);
 function loopSpec(loops) {
   if (loops.length === 0) return null;
   const kinds = KINDS.filter((kind) => loops.every((loop) => loop[`${kind}_nm`]));
-  const shown = loops.slice(0, NARROW.matches ? 1 : 3);
-  const axes = shown.flatMap((_, place) => [
-    [`xaxis${suffix(place)}`, titled("speed, rpm")],
-    [`yaxis${suffix(place)}`, titled(place ? "" : "torque, Nm")],
-  ]);
+  const shown = loops.slice(0, 3);
   return {
     note: shown.map(loopName).join(" · "),
     columns: [{ name: "loop" }, { name: "model" }, column("speed, rpm", 1), column("torque, Nm", 2)],
@@ -212,18 +136,15 @@ function loopSpec(loops) {
         loop.speed_rpm.map((speed, index) => [loopName(loop), kind, speed, loop[`${kind}_nm`][index]]),
       ),
     ),
-    figure: (c) => ({
-      data: shown.flatMap((loop, place) => kinds.map((kind) => loopTrace(loop, place, kind, c))),
-      layout: {
-        grid: { rows: 1, columns: shown.length, pattern: "independent", xgap: 0.12 },
-        ...Object.fromEntries(axes),
-      },
-    }),
+    figure: (c) =>
+      shown.map((loop) => ({
+        title: loopName(loop),
+        x: { title: "speed, rpm" },
+        y: { title: "torque, Nm" },
+        curves: kinds.map((kind) => loopCurve(loop, kind, c)),
+      })),
   };
 }
-
-/** @type {(place: number) => string} what the plotting library adds to an axis' name: nothing to the first one's */
-const suffix = (place) => (place ? String(place + 1) : "");
 
 /** @param {LoopTraceOut} loop */
 function loopName({ cycles, pressure_bar: pressure, frequency_hz: frequency }) {
@@ -231,20 +152,9 @@ function loopName({ cycles, pressure_bar: pressure, frequency_hz: frequency }) {
   return `${fixed(cycles)} cycles, ${fixed(pressure, 1)} bar${rate}`;
 }
 
-/** @type {(loop: LoopTraceOut, place: number, kind: Kind, c: Colours) => PlainTrace} */
-function loopTrace(loop, place, kind, c) {
-  const baseline = kind === "baseline";
-  return {
-    name: kind,
-    showlegend: place === 0,
-    legendgroup: kind,
-    x: loop.speed_rpm,
-    y: loop[`${kind}_nm`],
-    xaxis: `x${suffix(place)}`,
-    yaxis: `y${suffix(place)}`,
-    mode: kind === "measured" ? "markers" : "lines",
-    marker: { size: 3, color: c.quiet },
-    line: { width: 2, color: baseline ? c.worn : c.accent, dash: baseline ? "dash" : "solid" },
-    hovertemplate: `${kind}<br>%{x:.0f} rpm, %{y:.2f} Nm<extra></extra>`,
-  };
+/** @type {(loop: LoopTraceOut, kind: Kind, c: Colours) => Curve} */
+function loopCurve(loop, kind, c) {
+  const at = { name: kind, x: loop.speed_rpm, y: loop[`${kind}_nm`] };
+  if (kind === "measured") return { ...at, marker: { size: 3, color: c.quiet } };
+  return { ...at, line: kind === "baseline" ? { color: c.worn, dash: "dash" } : { color: c.accent } };
 }

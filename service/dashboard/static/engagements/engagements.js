@@ -3,7 +3,7 @@
 
 import { Chart, chooser, setControls } from "../charts/chart.js";
 import { column, CYCLES, digitsColumn, HALF_OF_90, KIND } from "../charts/columns.js";
-import { lineOf, measuredLine, planar } from "../charts/traces.js";
+import { measuredLine, planar } from "../charts/traces.js";
 import { INDICATORS, optionsOf, stateOptions, titleOf } from "../quantities/names.js";
 import { clutchPath, Problem, read } from "../shared/api.js";
 import { fixed, percent, significant } from "../shared/format.js";
@@ -35,9 +35,7 @@ function indicatorOverLife({ measured, events, name }) {
     note: `From ${fixed(values.length)} measured engagements. The 90 % error bars come from the noise of the records.`,
     columns: [CYCLES, digitsColumn(title, 4), digitsColumn("standard error", 2)],
     rows: values.map(({ x, value, sd }) => [x, value, sd]),
-    figure: planar("duty cycles", title, events, (c) => [
-      measuredLine(title, values, { size: 7, bars: 3, text: `%{x:,.0f} cycles<br>${title} %{y:.4g}` }, c.accent),
-    ]),
+    figure: planar("duty cycles", title, events, (c) => [measuredLine("", values, { size: 7, color: c.accent })]),
   };
 }
 
@@ -57,13 +55,13 @@ function engagementTrace({ compared, name }) {
   };
 }
 
-/** @type {(kind: string, trace: EngagementTrace, name: Channel, c: Colours) => PlainTrace} */
-function traceOf(kind, trace, name, c) {
-  const measured = kind === "measured";
-  const line = measured ? { color: c.accent, width: 1.6 } : { color: c.worn, width: 1.6, dash: "dash" };
-  const text = `${kind}<br>%{x:.2f} s, %{y:.4g} ${CHANNELS[name].unit}`;
-  return lineOf(measured ? "measured" : "tracked model", { x: trace.time_s, y: trace[name] }, line, text);
-}
+/** @type {(kind: string, trace: EngagementTrace, name: Channel, c: Colours) => Curve} */
+const traceOf = (kind, trace, name, c) => ({
+  name: kind === "measured" ? kind : "tracked model",
+  x: trace.time_s,
+  y: trace[name],
+  line: kind === "measured" ? { color: c.accent, width: 1.6 } : { color: c.worn, width: 1.6, dash: "dash" },
+});
 
 /** @type {(compared: ComparedEngagement) => string} where measurement and model part, in a sentence */
 function discrepancyOf({ model }) {

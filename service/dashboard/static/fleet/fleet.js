@@ -6,7 +6,7 @@ import { pollRaised, showRaised } from "../alarms/raised.js";
 import { sender } from "../sending/taking.js";
 import { at, clutchPath, read, send } from "../shared/api.js";
 import { agreed } from "../shared/dialog.js";
-import { button, byId, h, showTab } from "../shared/dom.js";
+import { button, byId, h, markShown, showTab } from "../shared/dom.js";
 import { age } from "../shared/format.js";
 import { Live } from "../shared/live.js";
 import { problemView } from "../shared/problem_view.js";
@@ -103,7 +103,7 @@ function show(counted, items, part) {
     MAIN.append(h("p", { id: "nothing", class: "notice", role: "status" }, "No clutch matches the search."));
   byId("printed").textContent =
     items.length < total ? `Rows ${part.offset + 1} to ${part.offset + items.length} of ${total}` : "";
-  requestAnimationFrame(() => setTimeout(() => performance.mark("fleet-shown")));
+  markShown("fleet-shown");
 }
 
 /** @param {Choice} choice */

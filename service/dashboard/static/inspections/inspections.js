@@ -49,13 +49,10 @@ function surfaceOverLife({ items, events, quantity }) {
         const color = rampOf(c, index, linings.length);
         return {
           name: nameOf(lining),
-          showlegend: linings.length > 1,
-          mode: "lines+markers",
           x: values.map(({ cycles }) => cycles),
           y: values.map((item) => item[quantity]),
           line: { color, width: 1.4 },
           marker: { color, size: 7 },
-          hovertemplate: `%{x:,.0f} cycles<br>${name} %{y:.4g}<extra>%{fullData.name}</extra>`,
         };
       }),
     ),

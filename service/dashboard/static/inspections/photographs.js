@@ -79,15 +79,13 @@ export function gallery(base) {
 async function open({ path, text }) {
   const dialog = h("dialog.photograph", { "aria-labelledby": "photograph-title" });
   const close = button("Close", () => dialog.close(), { class: "main" });
-  const image = h("img", { alt: text });
-  let address = "";
+  const image = h("canvas", { role: "img", "aria-label": text });
   dialog.append(h("h2", { id: "photograph-title" }, text), image, h("div.row.buttons", close));
-  void answered(dialog, () => URL.revokeObjectURL(address));
+  void answered(dialog, () => null);
   try {
-    const file = await readFile(path);
-    if (!dialog.open) return;
-    address = URL.createObjectURL(file);
-    image.src = address;
+    const picture = await createImageBitmap(await readFile(path));
+    [image.width, image.height] = [picture.width, picture.height];
+    image.getContext("bitmaprenderer")?.transferFromImageBitmap(picture);
   } catch {
     image.replaceWith(h("p.notice.bad", { role: "alert" }, "The photograph could not be read."));
   }

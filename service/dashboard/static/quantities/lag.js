@@ -62,7 +62,6 @@ const measuredOf = (items) =>
  */
 export function lagOverCycles({ items, name, pressure, events }) {
   if (items.length === 0) return { empty: missing(name) };
-  const { unit } = QUANTITIES[name];
   const chosen = items.find((item) => item.pressure_bar === pressure);
   const course = chosen && chosen.trajectory.cycles.length > 0 ? chosen : undefined;
   const more = course
@@ -75,24 +74,25 @@ export function lagOverCycles({ items, name, pressure, events }) {
       measuredAndLaw(item, { measured: "measured", law: "tracked", before: [item.pressure_bar, item.frequency_hz] }),
     ),
     figure: planar("duty cycles", axisOf(name), events, (c) => [
-      ...(course ? track(course, unit, c) : []),
-      ...linesByPressure(measuredOf(items), { size: 7, bars: 3, text: `%{y:.3g} ${unit}` }, c),
+      ...(course ? track(course, c) : []),
+      ...linesByPressure(measuredOf(items), 7, c),
     ]),
   };
 }
 
-/** @type {(item: DegradationItem, unit: string, c: Colours) => PlainTrace[]} */
-function track({ pressure_bar: level, trajectory }, unit, c) {
-  const name = `tracked, ${pressureText(level)}`;
-  const text = `%{x:,.0f} cycles, ${name}<br>%{y:.3g} ${unit}`;
-  return tracked(trajectory, { name, line: { color: c.accent, width: 2.2, dash: "dash" }, text }, c);
-}
+/** @type {(item: DegradationItem, c: Colours) => Curve[]} */
+const track = ({ pressure_bar: level, trajectory }, c) =>
+  tracked(
+    trajectory,
+    { name: `tracked, ${pressureText(level)}`, line: { color: c.accent, width: 2.2, dash: "dash" } },
+    c,
+  );
 
 /** @type {(answers: { items: DegradationItem[], name: LagName }) => Spec} a line a number of cycles */
 export function lagOverPressure({ items, name }) {
   const values = measuredOf(items);
   if (values.length === 0) return { empty: missing(name) };
-  const { title, unit } = QUANTITIES[name];
+  const { title } = QUANTITIES[name];
   const states = distinct(values.map(({ cycles }) => cycles));
   const drawn = spread(states);
   return {
@@ -107,8 +107,7 @@ export function lagOverPressure({ items, name }) {
         const label = `${fixed(state)} cycles`;
         const own = values.filter(({ cycles }) => cycles === state);
         const points = own.map(({ pressure, value, sd }) => ({ x: pressure, value, sd }));
-        const text = `%{x:.1f} bar, ${label}<br>%{y:.3g} ${unit}`;
-        return measuredLine(label, points, { size: 7, bars: 3, text }, rampOf(c, index, drawn.length));
+        return measuredLine(label, points, { size: 7, color: rampOf(c, index, drawn.length) });
       }),
     ),
   };

@@ -1,7 +1,7 @@
 // A Stribeck parameter of one test over pressure, its law (fig. 9) and how far the test determines it.
 
 import { column, HALF_OF_90, intervalColumns, KIND } from "../charts/columns.js";
-import { axisOf, PARAMETERS } from "../charts/parameters.js";
+import { axisOf } from "../charts/parameters.js";
 import { measuredPoints, planar, tracked } from "../charts/traces.js";
 import { fixed } from "../shared/format.js";
 
@@ -63,11 +63,8 @@ export function pressureLaw({ test, name }) {
     columns: COLUMNS,
     rows,
     figure: planar("pressure, bar", axisOf(name), [], (c) => [
-      ...tracked(course, { name: "law", line: { color: c.accent, width: 2 }, text: "%{x:.2f} bar<br>law %{y:.4g}" }, c),
-      measuredPoints("identified", identified, {
-        color: c.ink,
-        text: `%{x:.2f} bar<br>${PARAMETERS[name].title} %{y:.4g}`,
-      }),
+      ...tracked(course, { name: "law", line: { color: c.accent } }, c),
+      measuredPoints("identified", identified, { color: c.ink }),
     ]),
   };
 }

@@ -40,20 +40,14 @@ export function shudderMargin({ items, limits, counts, events }) {
 /** @param {CriterionOutcome} limit */
 const limitText = (limit) => `At ${fixed(limit.speed_rpm)} rpm ${reachedText(limit)}.`;
 
-/** @type {(item: DegradationItem, color: string, c: Colours) => PlainTrace[]} */
+/** @type {(item: DegradationItem, color: string, c: Colours) => Curve[]} */
 function slopeTraces({ speed_rpm: speed, measured, trajectory }, color, c) {
   const name = `${fixed(speed)} rpm`;
-  const at = `%{x:,.0f} cycles, ${name}<br>`;
-  const points = measuredPoints(name, measured, { color, text: `${at}measured %{y:.3g} s/m` });
-  return [
-    ...tracked(trajectory, { name, band: "", line: { color, width: 2 }, text: `${at}tracked %{y:.3g} s/m` }, c),
-    { ...points, showlegend: trajectory.cycles.length === 0 },
-  ];
+  return [...tracked(trajectory, { name, band: "", line: { color } }, c), measuredPoints(name, measured, { color })];
 }
 
-/** @type {(items: DegradationItem[], c: Colours) => PlainTrace} */
+/** @type {(items: DegradationItem[], c: Colours) => Curve} */
 function zeroLine(items, c) {
   const last = Math.max(1, ...items.flatMap(({ measured, trajectory }) => [...measured.cycles, ...trajectory.cycles]));
-  const line = { color: c.ink, width: 1.6, dash: "dash" };
-  return { name: "no margin", mode: "lines", x: [0, last], y: [0, 0], line, hoverinfo: "skip" };
+  return { name: "no margin", x: [0, last], y: [0, 0], line: { color: c.ink, width: 1.6, dash: "dash" }, silent: true };
 }

@@ -1,7 +1,7 @@
 // How one file is read: its first rows, each column with its channel, unit and scale to choose from, what will be cut and
 // fitted, drawn before anything is sent; and the rig profile that the choices are kept in.
 
-import { drawnAlone } from "../charts/sketch.js";
+import { drawnAlone } from "../charts/draw.js";
 import { band, planar } from "../charts/traces.js";
 import { send } from "../shared/api.js";
 import { button, field, h, quiet, scrolling, select } from "../shared/dom.js";
@@ -305,15 +305,13 @@ function drawing({ channels, pieces, fits, kind }) {
   const found = time ? `${pieces.length} ${piece} are cut` : `${torque.length} plateaus`;
   const text = `Torque over ${time ? "time" : "speed"}: ${found}, ${fits.length} curves are fitted.`;
   const figure = planar(time ? "time, s" : "speed, rpm", "torque, Nm", [], (c) => [
-    ...pieces.flatMap(({ start_s: from, stop_s: to }) =>
+    ...pieces.map(({ start_s: from, stop_s: to }) =>
       band("", { x: [from, to], y: [low, low] }, { x: [from, to], y: [high, high] }, c),
     ),
     {
-      mode: time ? "lines" : "markers",
       x,
       y: torque,
-      line: { color: c.accent, width: 1 },
-      marker: { color: c.accent, size: 4 },
+      ...(time ? { line: { color: c.accent, width: 1 } } : { marker: { color: c.accent, size: 4 } }),
     },
   ]);
   return h("figure.cutting", drawnAlone(figure, { width: 760, height: 220 }, text), h("figcaption", text));

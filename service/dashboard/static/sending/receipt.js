@@ -1,6 +1,6 @@
 // What the service made of a run: the curve, the fits, the warnings.
 
-import { drawnAlone } from "../charts/sketch.js";
+import { drawnAlone } from "../charts/draw.js";
 import { curvesOfRun } from "../charts/stribeck.js";
 import { clutchPath, read, readDrawn } from "../shared/api.js";
 import { h, scrolling, symbol, table } from "../shared/dom.js";

@@ -127,6 +127,9 @@ export function computing(place, what) {
   }, 1000);
 }
 
+/** @type {(name: string) => void} a mark in the browser's timeline, when what was changed is on the screen */
+export const markShown = (name) => void requestAnimationFrame(() => setTimeout(() => performance.mark(name)));
+
 /** @type {(letter: string, index: string) => HTMLElement} a letter with its index */
 export const symbol = (letter, index) => h("span", letter, h("sub", index));
 

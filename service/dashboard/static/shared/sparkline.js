@@ -1,4 +1,4 @@
-// Small drawings in a row of the fleet: plain SVG, no plotting library.
+// Small drawings in a row of the fleet: plain SVG.
 
 import { svg } from "./dom.js";
 

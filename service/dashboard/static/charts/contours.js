@@ -1,0 +1,154 @@
+// Isolines of a surface over a grid, linear between its points, and the surface as panels: the isolines beside the chosen cut.
+
+import { readOut, ticksOf } from "./frame.js";
+import { blend } from "./palette.js";
+
+/** @typedef {[number, number]} Point in the grid's units */
+/** @typedef {{ x: number[], y: number[], values: Values[] }} Grid a row a y */
+/** @typedef {Grid & { name: string, color?: string, measured?: Places & { z: Values } }} Surface */
+
+/** @type {(corners: { at: Point, z: number }[], level: number) => { kept: Point[], ends: Point[] }} of a triangle, from a level up */
+function cut(corners, level) {
+  const [kept, ends] = [/** @type {Point[]} */ ([]), /** @type {Point[]} */ ([])];
+  corners.forEach(({ at: [u, v], z }, index) => {
+    const next = corners[(index + 1) % 3];
+    if (z >= level) kept.push([u, v]);
+    if (z >= level === next.z >= level) return;
+    const share = (level - z) / (next.z - z);
+    const crossing = /** @type {Point} */ ([u + share * (next.at[0] - u), v + share * (next.at[1] - v)]);
+    kept.push(crossing);
+    ends.push(crossing);
+  });
+  return { kept, ends };
+}
+
+/** @type {(grid: Grid, level: number) => { above: Point[][], lines: Point[][] }} what is at or above a level, and its edge */
+export function isolines({ x, y, values }, level) {
+  const [above, lines] = [/** @type {Point[][]} */ ([]), /** @type {Point[][]} */ ([])];
+  for (let j = 1; j < y.length; j += 1) {
+    for (let i = 1; i < x.length; i += 1) {
+      const corners = [
+        [i - 1, j - 1],
+        [i, j - 1],
+        [i, j],
+        [i - 1, j],
+      ].map(([u, v]) => ({ at: /** @type {Point} */ ([x[u], y[v]]), z: values[v][u] ?? NaN }));
+      if (corners.some(({ z }) => Number.isNaN(z))) continue;
+      const higher = corners.filter(({ z }) => z >= level).length;
+      if (higher === 4) above.push(corners.map(({ at }) => at));
+      if (higher === 4 || higher === 0) continue;
+      for (const triangle of [corners.slice(0, 3), [corners[0], corners[2], corners[3]]]) {
+        const { kept, ends } = cut(triangle, level);
+        if (kept.length > 0) above.push(kept);
+        if (ends.length === 2) lines.push(ends);
+      }
+    }
+  }
+  return { above, lines };
+}
+
+/** @type {(xs: number[], values: Values, at: number) => number | null} between the points */
+function between(xs, values, at) {
+  const index = Math.max(
+    1,
+    xs.findIndex((x) => x >= at),
+  );
+  const [a, b] = [values[index - 1], values[index]];
+  if (a === null || b === null || at > xs[index]) return null;
+  return a + ((b - a) * (at - xs[index - 1])) / (xs[index] - xs[index - 1]);
+}
+
+/** @type {(title: string, values: number[]) => [number, string][]} each with its name, to as many digits as distinguish them */
+const named = (title, values) =>
+  values.map((at) => [at, readOut({ title }, at, [0, 500 * Math.abs(values[1] - values[0])])]);
+
+/**
+ * The cuts that can be chosen: at every y, and at round values of x; and the one chosen, or the middle one.
+ * @param {Surface[]} surfaces
+ * @param {{ x: string, y: string }} titles
+ * @param {string | undefined} wanted
+ */
+export function cutsOf(surfaces, { x, y }, wanted) {
+  const [{ x: xs, y: ys }] = surfaces;
+  const round = ticksOf([xs[0], xs[xs.length - 1]], 400, 80).filter(({ at }) => at >= xs[0]);
+  /** @type {(axis: string, choices: [number, string][]) => [string, string][]} */
+  const keyed = (axis, choices) => choices.map(([at, text]) => [`${axis} ${at}`, text]);
+  const options = [
+    ...keyed("y", named(y, ys)),
+    ...keyed(
+      "x",
+      named(
+        x,
+        round.map(({ at }) => at),
+      ),
+    ),
+  ];
+  const chosen = options.find(([key]) => key === wanted)?.[0] ?? `y ${ys[Math.floor(ys.length / 2)]}`;
+  return { options, chosen };
+}
+
+/**
+ * Isolines over x and y, filled where there is one surface; beside them z along the cut.
+ * @param {Surface[]} surfaces
+ * @param {{ x: string, y: string, z: Axis }} titles
+ * @param {{ options: [string, string][], chosen: string }} cuts
+ * @param {Colours} c
+ * @returns {Figure}
+ */
+export function contoured(surfaces, { x, y, z }, { options, chosen }, c) {
+  const all = surfaces.flatMap(({ values }) => values.flat().filter((value) => value !== null));
+  const range = /** @type {Span} */ (z.range ?? [Math.min(...all), Math.max(...all)]);
+  const levels = ticksOf(range, 400, 40).map(({ at }) => at);
+  const [axis, text] = chosen.split(" ");
+  const at = Number(text);
+  const [single] = surfaces;
+  const shade = (/** @type {number} */ level) =>
+    blend([c.panel, c.accent], 0.1 + (0.6 * (level - range[0])) / (range[1] - range[0]));
+  const cutLine = /** @type {Line} */ ({ color: c.worn, width: 2, dash: "dash" });
+  const along = surfaces.map(({ name, color = c.accent, ...grid }) => {
+    const whole = axis === "y";
+    const rows = whole ? grid.values[grid.y.indexOf(at)] : grid.values.map((row) => between(grid.x, row, at));
+    return {
+      name,
+      x: whole ? grid.x : grid.y,
+      y: rows ?? [],
+      line: { color },
+      ...(whole ? {} : { marker: { color } }),
+    };
+  });
+  const { measured } = single;
+  const near = (measured?.y ?? []).flatMap((level, index) => (axis === "y" && level === at ? [index] : []));
+  return [
+    {
+      x: { title: x },
+      y: { title: y },
+      fields: surfaces.map(({ name, color, ...grid }) => ({
+        ...grid,
+        name,
+        z: z.title,
+        levels: color ? levels : [-Infinity, ...levels],
+        ...(color ? { line: color } : { fill: shade }),
+      })),
+      curves: measured ? [{ x: measured.x, y: measured.y, marker: { color: c.quiet, size: 2 }, silent: true }] : [],
+      marks: [{ [axis]: at, line: cutLine, text: "" }],
+    },
+    {
+      title: options.find(([key]) => key === chosen)?.[1],
+      x: { title: axis === "y" ? x : y },
+      y: z,
+      curves: [
+        ...along,
+        ...(measured
+          ? [
+              {
+                name: "measured",
+                x: near.map((n) => measured.x[n]),
+                y: near.map((n) => measured.z[n]),
+                marker: { color: c.ink, size: 4 },
+              },
+            ]
+          : []),
+      ],
+    },
+  ];
+}
