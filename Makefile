@@ -3,7 +3,7 @@
 # make test    all tests but those of `make slow`
 # make quick   those that need no browser and no server and take no time, in one process: 1,600 tests within a minute
 # make slow    what takes long and rarely fails: what intervals promise, counted over many lives; further ways to the same
-#              answer, files cut off anywhere, charts drawn by the large library                               (30 minutes)
+#              answer, files cut off anywhere                                                                   (30 minutes)
 # make faults  kills the service and its commands hundreds of times, and sends what nobody sends: schemathesis over whole
 #              sequences of requests, and files of every format with bytes changed, MINUTES=10 of each
 #              (two and a half hours; ARGS="-k kills")

@@ -10,7 +10,7 @@ import httpx2
 from playwright.sync_api import Browser, Page
 from rich.console import Console
 
-from tests.browser.driving import chromium, pointed_at, turned
+from tests.browser.driving import chromium, drawn, turned
 from tests.browser.lives import demo, post
 from tests.measuring import ROOT
 from tests.support import served, stationary
@@ -41,7 +41,7 @@ def dashboard() -> None:
             _take(page, "fleet")
         with _page(browser, 1280, 960) as page:
             page.goto(f"{server.url}/clutches/sim-2")
-            pointed_at(page)
+            drawn(page)
             _take(page, "clutch")
             turned(page, "diagnosis").locator("#diagnosis").get_by_role("button", name="Run the diagnosis").click()
             page.locator("#diagnosis .verdict").wait_for(timeout=600_000)
@@ -49,12 +49,12 @@ def dashboard() -> None:
             _section(page, "curves", "stribeck", height=720)
         with _page(browser, 1280, 900, scheme="dark") as page:
             page.goto(f"{server.url}/clutches/sim-2")
-            pointed_at(page)
+            drawn(page)
             _section(page, "curves", "parameters", height=900, name="dark")
             turned(page, "overview")
-            page.locator("#report img").nth(1).wait_for(state="attached")
+            page.locator("#report .drawing").nth(1).wait_for(state="attached")
             page.emulate_media(media="print")
-            page.add_style_tag(content="body { padding: 24px }")  # a printer's margins
+            page.evaluate("document.body.style.padding = '24px'")  # a printer's margins
             page.set_viewport_size({"width": 808, "height": 1130})
             page.evaluate("scrollTo(0, 0)")
             page.wait_for_timeout(500)

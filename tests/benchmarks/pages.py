@@ -7,7 +7,7 @@ from tempfile import TemporaryDirectory
 
 from playwright.sync_api import Browser, Page
 
-from tests.browser.driving import FLAT, chromium, pointed_at
+from tests.browser.driving import chromium
 from tests.browser.lives import demo
 from tests.measuring import show
 from tests.scale.copies import life, multiply
@@ -23,8 +23,6 @@ ROWS = (
     "clutch page, the demo's life: first chart seen after its data arrived, nothing cached",
     "the same, from the address entered",
     "the same, the files cached",
-    "the chart that can be zoomed in its place, after it was pointed at, nothing cached",
-    "the same, the library cached",
 )
 
 
@@ -40,7 +38,7 @@ def pages() -> None:
 
 def start_page() -> None:
     """The start page with CLUTCHES clutches on a machine so many times slower, nothing cached."""
-    with TemporaryDirectory() as folder, chromium(more=FLAT) as browser:
+    with TemporaryDirectory() as folder, chromium() as browser:
         path = Path(folder) / "clutches.db"
         runs = [stationary(cycles, wear=cycles / 26_000) for cycles in range(0, 8000, 2000)]
         life(f"sqlite:///{path}", [json.dumps(run).encode() for run in runs])
@@ -73,24 +71,17 @@ def marked(page: Page, mark: str) -> float:
 
 
 def _clutch(browser: Browser, address: str) -> tuple[float, ...]:
-    """Milliseconds to the first chart, drawn light, and to the one of the plotting library in its place.
-
-    The first from the arrival of its data, from the start, and from the start with files cached; the second from the moment
-    at which someone points at the first, and the same with files cached.
-    """
+    """Milliseconds to the first chart: from the arrival of its data, from the start, and from the start with files cached."""
     context = browser.new_context()
     page = context.new_page()
-    taken: list[tuple[float, float, float]] = []
+    taken: list[tuple[float, float]] = []
     for _ in range(2):
         page.goto(address)
-        seen, pointed = marked(page, "sketched fan"), page.evaluate("performance.now()")
-        pointed_at(page)
-        drawn = marked(page, "drawn fan")
-        taken.append((page.evaluate(_LAST), seen, drawn - pointed))
+        taken.append((marked(page, "drawn fan"), page.evaluate(_LAST)))
         page.goto("about:blank")
     context.close()
-    (arrived, seen, drawn), (_, seen_cached, drawn_cached) = taken
-    return seen - arrived, seen, seen_cached, drawn, drawn_cached
+    (seen, arrived), (seen_cached, _) = taken
+    return seen - arrived, seen, seen_cached
 
 
 if __name__ == "__main__":

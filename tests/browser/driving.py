@@ -7,21 +7,19 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
-from playwright.sync_api import Browser, BrowserType, Page, expect, sync_playwright
+from playwright.sync_api import Browser, Locator, Page, expect, sync_playwright
 
 #: [ms] How long a page may take to show what is waited for: on a busy machine a diagnosis took more than 20 s.
 _PATIENCE = 60_000
 expect.set_options(timeout=_PATIENCE)
 
-#: Software rendering, so that 3D charts are drawn on a machine without a graphics card.
 ARGUMENTS = (
     "--no-sandbox",
     "--disable-background-networking",
     "--disable-component-update",
     "--disable-sync",
-    "--use-gl=angle",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
+    "--disable-gpu",
+    "--disable-3d-apis",
 )
 
 _LISTEN = """
@@ -38,31 +36,21 @@ def system() -> str | None:
     return os.environ.get("CHROMIUM") or next(filter(None, map(shutil.which, names)), None)
 
 
-def launched(kind: BrowserType, *, more: tuple[str, ...] = ()) -> Browser:
-    """A headless browser of that kind."""
-    return kind.launch(executable_path=system(), args=[*ARGUMENTS, *more])
-
-
-#: For whoever looks at no 3D chart: the simulated graphics card takes a third of a page's time.
-FLAT = ("--disable-gpu", "--disable-3d-apis")
-
-
 @contextmanager
-def chromium(*, more: tuple[str, ...] = ()) -> Iterator[Browser]:
+def chromium() -> Iterator[Browser]:
     """A headless Chromium, closed at the end."""
     with sync_playwright() as playwright:
-        found = launched(playwright.chromium, more=more)
+        found = playwright.chromium.launch(executable_path=system(), args=list(ARGUMENTS))
         yield found
         found.close()
 
 
-def pointed_at(page: Page, chart: str = "fan") -> None:
-    """Point at a chart and away again, as who wants to zoom: from then on the plotting library draws all of them."""
-    page.locator(f"#chart-{chart}").scroll_into_view_if_needed()  # on a phone it begins below what is drawn ahead
-    page.locator(f"#chart-{chart}[data-sketched]").wait_for()
-    page.locator(f"#chart-{chart} .plot").hover(position={"x": 3, "y": 3})
-    page.mouse.move(0, 0)
+def drawn(page: Page, chart: str = "fan") -> Locator:
+    """A chart, scrolled to and drawn."""
+    found = page.locator(f"#chart-{chart}")
+    found.scroll_into_view_if_needed()
     page.locator(f"#chart-{chart}[data-drawn]").wait_for()
+    return found
 
 
 def turned(page: Page, tab: str) -> Page:

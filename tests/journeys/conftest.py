@@ -7,7 +7,7 @@ import httpx2
 import pytest
 from playwright.sync_api import Browser
 
-from tests.browser.driving import FLAT, Watched, chromium, launched
+from tests.browser.driving import Watched, chromium
 from tests.service.clients import client_on
 from tests.support import Server, serving
 
@@ -28,22 +28,14 @@ def http(tmp_path: Path) -> Iterator[httpx2.Client]:
 
 @pytest.fixture(scope="package")
 def browser() -> Iterator[Browser]:
-    """A headless Chromium for all pages, which draws nothing in 3D."""
-    with chromium(more=FLAT) as flat:
-        yield flat
+    """A headless Chromium for all pages."""
+    with chromium() as found:
+        yield found
 
 
 @pytest.fixture
 def watched(browser: Browser, server: Server) -> Iterator[Watched]:
     """A page of the module's service."""
     found = Watched(browser, server.url)
-    yield found
-    found.close()
-
-
-@pytest.fixture(scope="module")
-def browser_3d(browser: Browser) -> Iterator[Browser]:
-    """One that draws in 3D, for the pages of a module."""
-    found = launched(browser.browser_type)
     yield found
     found.close()

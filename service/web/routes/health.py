@@ -10,6 +10,7 @@ from fastapi.responses import JSONResponse, Response
 from service.settings import CODE_VERSION
 from service.web.auth import Reader, context_of
 from service.web.metrics import MEDIA_TYPE
+from service.web.middleware import POLICY
 from service.web.problems import described
 from service.web.readiness import PARTS
 
@@ -78,8 +79,9 @@ _START = """SwaggerUIBundle({
 
 @description_router.get("/docs")
 async def description() -> Response:
-    """The page."""
-    return Response(content=_PAGE, media_type="text/html; charset=utf-8", headers={"Cache-Control": "no-cache"})
+    """The page; the icons of Swagger UI are written into its own styles."""
+    headers = {"Cache-Control": "no-cache", "Content-Security-Policy": f"{POLICY}; img-src 'self' data:"}
+    return Response(content=_PAGE, media_type="text/html; charset=utf-8", headers=headers)
 
 
 @description_router.get("/docs/start.js")

@@ -7,7 +7,7 @@ import pytest
 from axe_playwright_python.base import AXE_SCRIPT
 from playwright.sync_api import Browser, Page, expect
 
-from tests.browser.driving import Watched, pointed_at, turned
+from tests.browser.driving import Watched, turned
 from tests.browser.lives import post, worn
 from tests.service.changes import stand_in_engine
 from tests.support import serving, stationary
@@ -75,8 +75,6 @@ def test_a_clutch_with_a_diagnosis_and_all_that_opens(
 ) -> None:
     watched = Watched(browser, url, color_scheme=scheme, viewport=viewport)
     page = watched.open("/clutches/bench")
-    if viewport is WIDE:  # then the plotting library draws all charts
-        pointed_at(page)
     # neither clicked nor pressed: a chart above it may still grow, and the page may still move its focus
     page.locator("#chart-fan details").evaluate("details => { details.open = true; }")
     page.locator("#chart-fan table").wait_for()

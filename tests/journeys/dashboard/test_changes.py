@@ -274,7 +274,7 @@ def test_a_clutch_is_archived_and_brought_back(watched: Watched) -> None:
 @pytest.mark.slow
 def test_warnings_of_a_life_stand_on_its_page(watched: Watched, server: Server) -> None:
     page = turned(opened(watched), "overview")
-    page.locator("#chart-fan[data-sketched]").wait_for()
+    page.locator("#chart-fan[data-drawn]").wait_for()
     expect(page.locator("#tab-overview")).not_to_contain_text("The last test does not fit")
     odd = right(LAST)
     odd["channels"]["torque_nm"] = [0.93 * value for value in odd["channels"]["torque_nm"]]

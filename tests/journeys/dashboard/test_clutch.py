@@ -1,5 +1,6 @@
 """A clutch's page on the demo's life: every chart drawn, its table, its files, its report; live."""
 
+import base64
 import csv
 import io
 import re
@@ -10,7 +11,8 @@ import openpyxl
 import pytest
 from playwright.sync_api import Browser, Locator, Page, expect
 
-from tests.browser.driving import Watched, pointed_at, turned
+from tests.browser.driving import Watched, turned
+from tests.browser.driving import drawn as drawn_on
 from tests.browser.lives import demo, post
 from tests.browser.pixels import seen
 from tests.support import ONCE, Server, filled_service
@@ -25,7 +27,7 @@ CHARTS = {
     },
     "curves": {
         "stribeck": "Stribeck curves",
-        "surface": "Stribeck curves in 3D",
+        "surface": "Lines of equal torque",
         "static-torque-nm": "Static torque Ms",
         "coulomb-ratio": "Coulomb ratio M̄c",
         "stribeck-velocity-m-s": "Stribeck velocity VS",
@@ -69,31 +71,18 @@ def watched(browser: Browser, life: Server) -> Iterator[Watched]:
     found.close()
 
 
-@pytest.fixture(scope="module")
-def watched_3d(browser_3d: Browser, life: Server) -> Iterator[Watched]:
-    """The same in a browser that draws in 3D."""
-    found = Watched(browser_3d, life.url)
-    yield found
-    found.close()
-
-
 def opened(watched: Watched) -> Page:
     return watched.page if "/clutches/sim-1" in watched.page.url else watched.open("/clutches/sim-1")
 
 
 def drawn(page: Page, name: str) -> Locator:
     """The chart, scrolled to and drawn."""
-    chart = turned(page, TAB_OF[name]).locator(f"#chart-{name}")
-    chart.scroll_into_view_if_needed()
-    page.locator(f"#chart-{name}[data-drawn]").wait_for()
-    page.wait_for_timeout(100)
-    return chart
+    return drawn_on(turned(page, TAB_OF[name]), name)
 
 
 @pytest.mark.slow
-def test_every_chart_is_drawn(watched_3d: Watched) -> None:
-    page = opened(watched_3d)
-    pointed_at(page)
+def test_every_chart_is_drawn(watched: Watched) -> None:
+    page = opened(watched)
     for tab, names in CHARTS.items():
         turned(page, tab)
         expect(page.locator("figure.chart:visible h3")).to_have_text(list(names.values()))
@@ -129,7 +118,7 @@ def test_the_page_answers_first(browser: Browser, life: Server, size: tuple[int,
     assert box["y"] + box["height"] <= size[1]
     assert page.evaluate("document.documentElement.scrollWidth") <= size[0]
     page.locator("#chart-shudder").scroll_into_view_if_needed()  # on a phone it begins below what is drawn ahead
-    page.locator("#chart-shudder[data-sketched]").wait_for()
+    page.locator("#chart-shudder[data-drawn]").wait_for()
     if size[0] == 1280:
         assert page.evaluate("document.documentElement.scrollHeight") <= MAX_OVERVIEW_PX
     watched.close()
@@ -185,9 +174,8 @@ def test_units_are_chosen_and_kept(browser: Browser, life: Server) -> None:
 
 
 @pytest.mark.slow
-def test_dark_and_light_are_chosen_and_the_charts_follow(watched_3d: Watched) -> None:
-    page = opened(watched_3d)
-    pointed_at(page)
+def test_dark_and_light_are_chosen_and_the_charts_follow(watched: Watched) -> None:
+    page = opened(watched)
     button = page.locator("#theme")
     assert button.inner_text() == "Theme: system"
     for theme, dark in (("light", False), ("dark", True), ("system", False)):
@@ -237,20 +225,54 @@ def test_what_the_page_says_is_what_the_service_says(watched: Watched) -> None:
     tested.locator("table").first.wait_for()
 
 
+def saved(page: Page, chart: Locator, kind: str) -> bytes:
+    """The chart's file of that kind."""
+    with page.expect_download() as file:
+        chart.get_by_role("button", name=kind.upper()).click()
+    assert file.value.suggested_filename == f"sim-1-{chart.get_attribute('id').removeprefix('chart-')}.{kind}"
+    return Path(file.value.path()).read_bytes()
+
+
+_DIFFERING = """async ([png, svg]) => {
+  const shades = await Promise.all([["png", png], ["svg+xml", svg]].map(async ([type, data]) => {
+    const image = new Image();
+    image.src = `data:image/${type};base64,${data}`;
+    await image.decode();
+    const pen = new OffscreenCanvas(2000, 1200).getContext("2d");
+    pen.drawImage(image, 0, 0, 2000, 1200);
+    return pen.getImageData(0, 0, 2000, 1200).data;
+  }));
+  let count = 0;
+  for (let at = 0; at < shades[0].length; at += 4) {
+    if ([0, 1, 2].some((n) => Math.abs(shades[0][at + n] - shades[1][at + n]) > 100)) count += 1;
+  }
+  return count / (2000 * 1200);
+}"""
+
+
+def differing(page: Page, picture: bytes, drawing: bytes) -> float:
+    """Share of the pixels in which the PNG differs much from the SVG, as the browser itself draws that."""
+    assert page.context.browser is not None
+    blank = page.context.browser.new_page()  # the page's own policy loads no such pictures
+    found: float = blank.evaluate(_DIFFERING, [base64.b64encode(each).decode() for each in (picture, drawing)])
+    blank.close()
+    return found
+
+
 @pytest.mark.slow
-def test_every_chart_has_a_table_a_png_and_a_csv(watched_3d: Watched) -> None:
-    page = opened(watched_3d)
-    pointed_at(page)
+def test_every_chart_has_a_table_a_png_an_svg_and_a_csv(watched: Watched) -> None:
+    page = opened(watched)
     for name in ("fan", "landscape"):
         chart = drawn(page, name)
         chart.locator("summary").click()
         chart.locator("table tbody tr").nth(20).wait_for()
-        with page.expect_download() as png:
-            chart.get_by_role("button", name="PNG").click()
-        assert png.value.suggested_filename == f"sim-1-{name}.png"
-        head = Path(png.value.path()).read_bytes()
-        assert head.startswith(b"\x89PNG")
-        assert len(head) > 20_000
+        picture, drawing = (saved(page, chart, kind) for kind in ("png", "svg"))
+        assert picture.startswith(b"\x89PNG")
+        assert len(picture) > 20_000
+        assert re.match(rb'<svg [^>]*xmlns="http://www.w3.org/2000/svg"', drawing)
+        assert b"duty cycles" in drawing
+        lacking = re.sub(rb"(</?)(path|text)\b", rb"\1none", drawing)
+        assert differing(page, picture, drawing) < 0.1 * differing(page, picture, lacking)
     for chart in turned(page, "overview").locator("figure.chart:visible").all():
         assert chart.get_by_role("button", name="PNG").is_visible()
         assert chart.get_by_role("button", name="CSV").is_visible()
@@ -258,7 +280,7 @@ def test_every_chart_has_a_table_a_png_and_a_csv(watched_3d: Watched) -> None:
     with page.expect_download() as sheet:
         page.locator("#chart-fan").get_by_role("button", name="CSV").click()
     rows = list(csv.DictReader(io.StringIO(Path(sheet.value.path()).read_bytes().decode())))
-    pooled = ONCE.get(f"{watched_3d.url}/v1/clutches/sim-1/degradation").json()["items"][0]["measured"]
+    pooled = ONCE.get(f"{watched.url}/v1/clutches/sim-1/degradation").json()["items"][0]["measured"]
     measured = [float(row["mean COF"]) for row in rows if row["kind"] == "measured"]
     assert measured == pooled["value"]
 
@@ -286,7 +308,7 @@ def test_pressure_and_view_are_chosen_by_keyboard(watched: Watched) -> None:
 def test_the_report_is_one_page_and_light(browser: Browser, life: Server) -> None:
     watched = Watched(browser, life.url, color_scheme="dark")
     page = opened(watched)
-    page.locator("#report img").nth(1).wait_for(state="attached")
+    page.locator("#report .drawing").nth(1).wait_for(state="attached")
     pdf = page.pdf(prefer_css_page_size=True)
     assert len(re.findall(rb"/Type\s*/Page[^s]", pdf)) == 1
     page.emulate_media(media="print", color_scheme="dark")
@@ -295,16 +317,4 @@ def test_the_report_is_one_page_and_light(browser: Browser, life: Server) -> Non
     for part in ("sim-1", "Remaining cycles", "Threshold", "Diagnosis:", "The last tests", "Made of: Clutchlife "):
         assert part in report.inner_text()
     assert not seen(report).is_dark
-    watched.close()
-
-
-@pytest.mark.slow
-def test_without_webgl_the_page_says_so_and_keeps_the_numbers(browser: Browser, life: Server) -> None:
-    watched = Watched(browser, life.url)
-    page = watched.open("/clutches/sim-1#/curves")
-    surface = page.locator("#chart-surface")
-    surface.scroll_into_view_if_needed()
-    surface.get_by_text("This browser does not draw in 3D").wait_for()
-    surface.locator("summary").click()
-    surface.locator("table tbody tr").nth(100).wait_for()
     watched.close()

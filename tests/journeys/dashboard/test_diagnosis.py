@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import Page, expect
 
-from tests.browser.driving import Watched, turned
+from tests.browser.driving import Watched, drawn, turned
 from tests.browser.lives import post, worn
 from tests.browser.pixels import seen
 from tests.support import Server, filled_service, stationary
@@ -75,12 +75,8 @@ def adopt(page: Page, *, agree: bool) -> None:
 
 
 def maps_are_drawn(page: Page) -> None:
-    page.locator("#chart-map-speed").get_by_role("button", name="Draw it").click()
     for name in ("map-speed", "map-cycles", "diagnosis-loops"):
-        page.locator(f"#chart-{name}").scroll_into_view_if_needed()
-        page.locator(f"#chart-{name}[data-drawn]").wait_for()
-    page.wait_for_timeout(200)
-    assert seen(page.locator("#chart-diagnosis-loops .plot")).is_chart
+        assert seen(drawn(page, name).locator(".plot")).is_chart, name
 
 
 @pytest.mark.slow

@@ -54,7 +54,7 @@ def test_the_margin_and_the_lag_are_read_when_they_are_looked_at_and_again_when_
     page.goto(f"{server.url}/")  # another document, so that the tab of the curves is the first that is opened
     watched.asked.clear()
     watched.open("/clutches/bench#/curves")
-    page.locator("#chart-stribeck[data-sketched]").wait_for()
+    page.locator("#chart-stribeck[data-drawn]").wait_for()
     assert asked(watched, "degradation?quantity") == 0
 
     margin = turned(page, "overview").locator("#chart-shudder")

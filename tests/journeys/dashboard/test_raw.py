@@ -10,7 +10,7 @@ from playwright.sync_api import Browser, Page, expect
 
 from storage import raw_columns, runs
 from storage.engine.opening import open_database
-from tests.browser.driving import Watched, Wire, pointed_at
+from tests.browser.driving import Watched, Wire
 from tests.browser.lives import loops, post
 from tests.support import Server, serving, stationary, torque_nm
 
@@ -77,19 +77,18 @@ def runs_read(page: Page, wire: Wire, count: int) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("tab", ["overview", "curves", "loops", "runs", "history"])
-def test_a_tab_of_a_clutch_of_raw_runs_is_light(browser_3d: Browser, life: Server, tab: str) -> None:
-    watched = Watched(browser_3d, life.url)
+def test_a_tab_of_a_clutch_of_raw_runs_is_light(browser: Browser, life: Server, tab: str) -> None:
+    watched = Watched(browser, life.url)
     page, wire = watched.page, Wire(watched.page)
     watched.open(f"/clutches/bench#/{tab}")
     runs_read(page, wire, {"curves": 6, "loops": 6}.get(tab, 0))
     page.get_by_text("Live, as of").wait_for()
-    # nothing has been overlooked: page, files, answers and runs are among it, the library is not, and it is not small
+    # nothing has been overlooked: page, files, answers and runs are among it
     assert len(wire.loaded) > 50
     assert min(len(wire.of(part)) for part in ("/clutches/bench", "clutch.js")) >= 1
-    assert wire.of("plotly") == []
     assert [url for url, _ in wire.loaded if "/runs/" in url and "?points=" not in url] == []
     if tab == "loops":  # the charts show the records with their peaks
-        page.locator("#chart-loop-curves[data-sketched]").wait_for()
+        page.locator("#chart-loop-curves[data-drawn]").wait_for()
         page.locator("#chart-loop-curves summary").click()
         expect(page.locator("#chart-loop-curves tbody tr")).to_have_count(MOST_ROWS)
         assert page.locator("#chart-loop-curves").get_by_text(f"The first {MOST_ROWS} of").is_visible()
@@ -100,18 +99,4 @@ def test_a_tab_of_a_clutch_of_raw_runs_is_light(browser_3d: Browser, life: Serve
     everything = sum(wire.of(""))
     print(f"{tab}: {everything} bytes, of which runs {sum(wire.of('?points='))}")
     assert everything < MOST_BYTES
-    watched.close()
-
-
-@pytest.mark.slow
-def test_the_library_is_loaded_once_and_kept(browser: Browser, life: Server) -> None:
-    watched = Watched(browser, life.url)
-    page, wire = watched.page, Wire(watched.page)
-    watched.open("/clutches/bench")
-    pointed_at(page)
-    (size,) = wire.of("plotly")
-    assert 1_000_000 < size < 1_500_000
-    page.reload()
-    pointed_at(page)
-    assert wire.of("plotly") == [size, 0]
     watched.close()

@@ -1,6 +1,7 @@
 """Functions of the pages' modules, loaded into a browser from a running service and called from Python."""
 
 import json
+import math
 import re
 from collections.abc import Callable, Iterator
 from itertools import pairwise
@@ -12,7 +13,7 @@ import pytest
 from models.friction.pressure_laws import AsymptoticPressureLaw, LinearPressureLaw
 from service.api.clutch import ClutchIn
 from service.api.life import QuantityName
-from tests.browser.driving import FLAT, chromium
+from tests.browser.driving import chromium
 from tests.browser.modules import Module, load, open_page
 from tests.support import Server, serving
 
@@ -29,7 +30,7 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
 @pytest.fixture(scope="module")
 def loaded(server: Server) -> Iterator[Callable[[str], Module]]:
     """A module by its name in the tree, in an empty page of the service."""
-    with chromium(more=FLAT) as browser:
+    with chromium() as browser:
         page = open_page(browser, server)
         yield lambda name: load(page, server, name)
 
@@ -46,18 +47,23 @@ shown = module("shared/format.js")
 law = module("charts/stribeck_law.js")
 
 
-# --- Where a light chart has its axes, ticks and legend.
-FONT = {"family": "monospace", "size": 12, "color": "#000"}
+# --- Where a chart has its axes, ticks and legend.
+FONT = {"family": "monospace", "size": 12}
 
 
-def trace(x: list[Any], y: list[Any], mode: str = "lines", **more: Any) -> dict[str, Any]:
-    return {"mode": mode, "x": x, "y": y} | more
+def curve(x: list[Any], y: list[Any], **more: Any) -> dict[str, Any]:
+    return {"x": x, "y": y} | more
 
 
-def settled(frame: Module, *data: dict[str, Any], **layout: Any) -> dict[str, Any]:
-    own = {"font": FONT, "margin": {"l": 56, "r": 16, "t": 12, "b": 48}, "legend": {"font": {"size": 11}}}
-    figure = {"data": list(data), "layout": own | {"xaxis": {}, "yaxis": {}} | layout}
-    return frame("settled", figure, {"width": 600, "height": 400})
+def framed(frame: Module, *curves: dict[str, Any], width: int = 600, **axes: Any) -> dict[str, Any]:
+    """A figure of one panel with its places."""
+    figure = [{"x": {"title": "x"}, "y": {"title": "y"}, "curves": list(curves)} | axes]
+    return frame("framed", figure, {"width": width, "height": 400})
+
+
+def ranges(frame: Module, *curves: dict[str, Any], **axes: Any) -> tuple[list[float], list[float]]:
+    (panel,) = framed(frame, *curves, **axes)["frames"]
+    return panel["x"]["range"], panel["y"]["range"]
 
 
 @pytest.mark.parametrize(
@@ -84,58 +90,119 @@ def test_ticks_are_one_two_or_five_times_a_power_of_ten(
 
 
 def test_a_range_leaves_room_about_what_is_drawn_and_its_error_bars(frame: Module) -> None:
-    layout = settled(frame, trace([0, 10], [1, 3]))["layout"]
-    assert layout["xaxis"]["range"] == pytest.approx([-0.2, 10.2])
-    assert layout["yaxis"]["range"] == pytest.approx([0.9, 3.1])
-    marked = settled(frame, trace([0, 10], [1, 3], "lines+markers"))["layout"]
-    assert marked["xaxis"]["range"] == pytest.approx([-0.5, 10.5])  # points would be cut at the edge
-    bars = {"array": [1, 2, 5], "color": "#000", "thickness": 1, "width": 3}
-    layout = settled(frame, trace([0, 1, 2], [10, 20, None], error_y=bars))["layout"]
-    assert layout["yaxis"]["range"] == pytest.approx([9 - 0.65, 22 + 0.65])
+    x, y = ranges(frame, curve([0, 10], [1, 3]))
+    assert x == pytest.approx([-0.2, 10.2])
+    assert y == pytest.approx([0.9, 3.1])
+    x, _ = ranges(frame, curve([0, 10], [1, 3], marker={"color": "#000"}))
+    assert x == pytest.approx([-0.5, 10.5])  # points would be cut at the edge
+    _, y = ranges(frame, curve([0, 1, 2], [10, 20, None], half=[1, 2, 5]))
+    assert y == pytest.approx([9 - 0.65, 22 + 0.65])
+    _, y = ranges(frame, curve([0, 1], [10, 20], lower={"x": [0, 1], "y": [0, 5]}))
+    assert y == pytest.approx([-1, 21])
 
 
 @pytest.mark.parametrize(
-    ("values", "mode", "expected"),
+    ("values", "zero", "expected"),
     [
-        ([0, 10], "tozero", [0, 10.2]),
-        ([4, 10], "tozero", [0, 10.2]),
-        ([-5, 5], "tozero", [-5.2, 5.2]),  # below zero it starts where the values start
-        ([None, 2, 4, None], None, [1.96, 4.04]),
-        ([None, None], None, [0, 1]),
-        ([], None, [0, 1]),
-        ([5, 5], None, [4.5, 5.5]),
-        ([0, 0], None, [-1, 1]),
-        ([float("nan"), 1, 2], None, [0.98, 2.02]),
+        ([0, 10], True, [0, 10.2]),
+        ([4, 10], True, [0, 10.2]),
+        ([-5, 5], True, [-5.2, 5.2]),  # below zero it starts where the values start
+        ([None, 2, 4, None], False, [1.96, 4.04]),
+        ([None, None], False, [0, 1]),
+        ([], False, [0, 1]),
+        ([5, 5], False, [4.5, 5.5]),
+        ([0, 0], False, [-1, 1]),
+        ([float("nan"), 1, 2], False, [0.98, 2.02]),
     ],
 )
-def test_ranges_at_their_edges(frame: Module, values: list[Any], mode: str | None, expected: list[float]) -> None:
-    axis = {} if mode is None else {"rangemode": mode}
-    layout = settled(frame, trace(values, [1] * len(values)), xaxis=axis)["layout"]
-    assert layout["xaxis"]["range"] == pytest.approx(expected)
+def test_ranges_at_their_edges(frame: Module, values: list[Any], zero: bool, expected: list[float]) -> None:
+    x, _ = ranges(frame, curve(values, [1] * len(values)), x={"title": "x", "zero": zero})
+    assert x == pytest.approx(expected)
+
+
+def test_logarithmic_axes_and_categories(frame: Module) -> None:
+    (panel,) = framed(frame, curve([1, 1000, 0, None], [1, 1, 1, 1]), x={"title": "x", "log": True})["frames"]
+    assert panel["x"]["range"] == pytest.approx([1 / 1000**0.02, 1000**1.02])
+    assert [tick["text"] for tick in panel["x"]["ticks"]] == [
+        "1",
+        "2",
+        "5",
+        "10",
+        "20",
+        "50",
+        "100",
+        "200",
+        "500",
+        "1,000",
+    ]
+    (panel,) = framed(frame, x={"title": "x", "names": ["a", "b", "c"]})["frames"]
+    assert panel["x"]["range"] == [-0.5, 2.5]
+    assert [tick["text"] for tick in panel["x"]["ticks"]] == ["a", "b", "c"]
 
 
 def test_a_legend_fits_beside_itself_or_breaks_into_rows(frame: Module) -> None:
-    named = [trace([0, 1], [0, 1], name=name) for name in ("a", "bb", "ccc")]
-    short = settled(frame, *named, trace([0], [0]), trace([0], [0], name="hidden", showlegend=False))
-    entries = short["legend"]["entries"]
-    assert [entry["trace"]["name"] for entry in entries] == ["a", "bb", "ccc"]
-    assert entries[0]["x"] == 0
+    named = [curve([0, 1], [0, 1], name=name) for name in ("a", "bb", "ccc", "a")]
+    short = framed(frame, *named, curve([0], [0]))
+    entries = short["legend"]
+    assert [entry["curve"]["name"] for entry in entries] == ["a", "bb", "ccc"]
     for before, entry in pairwise(entries):
         assert entry["x"] == pytest.approx(before["x"] + before["width"] + 5)
         assert entry["y"] == before["y"]
-    long = settled(frame, *(trace([0, 1], [0, 1], name="n" * 40) for _ in range(3)))
-    rows = [entry["y"] for entry in long["legend"]["entries"]]
+    long = framed(frame, *(curve([0, 1], [0, 1], name=n * 40) for n in "nmo"))
+    rows = [entry["y"] for entry in long["legend"]]
     assert rows == sorted(set(rows))
-    assert {entry["x"] for entry in long["legend"]["entries"]} == {0}
-    assert long["layout"]["margin"]["b"] > short["layout"]["margin"]["b"]
+    assert len({entry["x"] for entry in long["legend"]}) == 1
+    assert long["frames"][0]["inside"]["height"] < short["frames"][0]["inside"]["height"]
 
 
-def test_margins_hold_labels_titles_and_legend(frame: Module) -> None:
-    small = settled(frame, trace([0, 1], [0, 1]), yaxis={"range": [0, 9]})["layout"]
-    assert small["margin"] == {"l": 56, "r": 16, "t": 12, "b": 49}  # b: two lines of 1.3 x 12 px and 18 px between
-    big = settled(frame, trace([0, 1], [0, 12_345_678]))
-    widest = max(frame("widthOf", tick["text"], FONT) for tick in big["ticks"]["y"])
-    assert big["layout"]["margin"]["l"] == round(max(56, widest + 1.3 * 12 + 24)) > 56
+def test_margins_hold_labels_and_titles(frame: Module) -> None:
+    whole = framed(frame, curve([0, 1], [0, 1]), y={"title": "y", "range": [0, 9]})
+    small, size = whole["frames"][0], whole["font"]["size"]
+    assert (small["l"], small["t"]) == (56, 12)
+    assert small["bottom"] - small["t"] - small["inside"]["height"] == pytest.approx(2.6 * size + 18)
+    big = framed(frame, curve([0, 1], [0, 12_345_678]))["frames"][0]
+    widest = max(frame("widthOf", tick["text"], whole["font"]) for tick in big["y"]["ticks"])
+    assert big["l"] == round(max(56, widest + 1.3 * size + 24)) > 56
+
+
+def test_panels_stand_beside_each_other_or_below_each_other(frame: Module) -> None:
+    panel = {"x": {"title": "x"}, "y": {"title": "y"}, "curves": []}
+    wide = frame("framed", [panel, panel], {"width": 900, "height": 400})
+    narrow = frame("framed", [panel, panel], {"width": 390, "height": 400})
+    assert [each["left"] for each in wide["frames"]] == [0, 450]
+    assert [each["bottom"] for each in narrow["frames"]] == [320, 640]
+    assert narrow["size"] == {"width": 390, "height": 640}
+
+
+# --- Isolines, against closed forms.
+
+
+def area(corners: list[list[float]]) -> float:
+    """Of a polygon, positive anticlockwise."""
+    return sum(a * d - b * c for (a, b), (c, d) in pairwise([*corners, corners[0]])) / 2
+
+
+def test_isolines_of_a_plane_are_exact(loaded: Callable[[str], Module]) -> None:
+    x, y = [0, 1, 3, 4], [0, 2, 5]
+    found = loaded("charts/contours.js")("isolines", {"x": x, "y": y, "values": [[u + 2 * v for u in x] for v in y]}, 6)
+    # above u + 2 v = 6: the rectangle less the corner with the corners (0, 0), (4, 0), (4, 1), (0, 3)
+    assert sum(map(area, found["above"])) == pytest.approx(20 - 8)
+    assert min(map(area, found["above"])) >= 0  # one way round: no seams between them
+    assert sum(math.dist(*line) for line in found["lines"]) == pytest.approx(math.hypot(4, 2))
+    assert all(u + 2 * v == pytest.approx(6) for line in found["lines"] for u, v in line)
+
+
+def test_isolines_of_a_hill_and_where_a_value_is_missing(loaded: Callable[[str], Module]) -> None:
+    isolines = loaded("charts/contours.js")
+    steps = [(n - 30) / 10 for n in range(61)]
+    hill: list[list[float | None]] = [[-u * u - v * v for u in steps] for v in steps]
+    found = isolines("isolines", {"x": steps, "y": steps, "values": hill}, -4)
+    assert sum(map(area, found["above"])) == pytest.approx(
+        4 * math.pi, rel=0.005
+    )  # the grid's step is 1/20 of the radius
+    hill[30][30] = None
+    found = isolines("isolines", {"x": steps, "y": steps, "values": hill}, -4)
+    assert sum(map(area, found["above"])) == pytest.approx(4 * math.pi - 0.04, rel=0.005)  # four cells less
 
 
 # --- The heading of a diagnosis, and remaining life before and after on one scale.

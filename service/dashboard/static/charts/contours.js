@@ -60,7 +60,7 @@ function between(xs, values, at) {
 
 /** @type {(title: string, values: number[]) => [number, string][]} each with its name, to as many digits as distinguish them */
 const named = (title, values) =>
-  values.map((at) => [at, readOut({ title }, at, [0, 500 * Math.abs(values[1] - values[0])])]);
+  values.map((at) => [at, readOut({ title }, at, [0, 300 * Math.abs(values[1] - values[0])])]);
 
 /**
  * The cuts that can be chosen: at every y, and at round values of x; and the one chosen, or the middle one.

@@ -94,7 +94,7 @@ function scaleOf(axis, range, start, end, least) {
       return axis.log ? 10 ** value : value;
     },
     ticks: axis.names
-      ? namesOf(axis.names, range, length / least)
+      ? namesOf(axis.names, range, length / 40)
       : axis.log && to - from > 0.7
         ? powersOf(range)
         : linear(),
@@ -104,7 +104,7 @@ function scaleOf(axis, range, start, end, least) {
 /** @type {(axis: Axis, value: number, range: Span) => string} a value with the name and unit of its axis: pressure 5.0 bar */
 export function readOut({ title, names }, value, [from, to]) {
   const [name, unit = ""] = plain(title).split(/, (?=[^,]*$)/);
-  const decimals = Math.max(0, Math.min(8, Math.ceil(-Math.log10(Math.abs(to - from) / 500) - 1e-9)));
+  const decimals = Math.max(0, Math.min(8, Math.ceil(-Math.log10(Math.abs(to - from) / 300) - 1e-9)));
   return `${name} ${names?.[Math.round(value)] ?? fixed(value, decimals)} ${unit}`.trim();
 }
 

@@ -82,7 +82,7 @@ function lawSpec(curves) {
   if (curves.length === 0) return null;
   const shown = [...new Set([curves[0], curves.at(-1)])].flatMap((c) => c ?? []);
   return {
-    note: `${shown.map(curveName).join(" · ")}. The band holds the law with a probability of 90 %.`,
+    note: "Measured points, eq. 3, and the law as found. The band holds the law with a probability of 90 %.",
     columns: [
       { name: "curve" },
       column("speed, rpm", 1),
@@ -129,7 +129,7 @@ function loopSpec(loops) {
   const kinds = KINDS.filter((kind) => loops.every((loop) => loop[`${kind}_nm`]));
   const shown = loops.slice(0, 3);
   return {
-    note: shown.map(loopName).join(" · "),
+    note: "Measured points beside the baseline and the extended model.",
     columns: [{ name: "loop" }, { name: "model" }, column("speed, rpm", 1), column("torque, Nm", 2)],
     rows: loops.flatMap((loop) =>
       kinds.flatMap((kind) =>
