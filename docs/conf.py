@@ -35,8 +35,8 @@ html_math_renderer = "mathml"
 html_theme_options = {"footer_icons": []}
 nitpicky = True
 
-#: A script or style within a page and a picture within a style, which are moved to files; and the theme's styles within elements,
-#: with what stands in their place.
+#: A script or style within a page and a picture within a style, which are moved to files; and the theme's styles within
+#: elements, with what stands in their place.
 _INLINE = re.compile(r"<(script|style)>(.*?)</\1>", flags=re.DOTALL)
 _PICTURE = re.compile(r"""url\((["'])data:image/svg\+xml;charset=utf-8,(.*?)\1\)""")
 _STYLES = {'style="opacity: 50%"': 'opacity="0.5"', 'style="display: none;"': 'display="none"'}

@@ -139,7 +139,7 @@ class Heads(_OfRequests):
 
 #: Scripts, styles, images and all else are files of this service.
 POLICY = "default-src 'self'; object-src 'none'; frame-ancestors 'none'; base-uri 'none'; form-action 'none'"
-#: Unless a route says otherwise: nothing is sniffed, framed or told to other hosts, and no page loads what POLICY does not allow.
+#: Unless a route says otherwise: nothing is sniffed or told to other hosts, and no page loads what POLICY does not allow.
 _SAFE = {
     "X-Content-Type-Options": "nosniff",
     "Referrer-Policy": "no-referrer",

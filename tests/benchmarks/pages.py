@@ -71,7 +71,7 @@ def marked(page: Page, mark: str) -> float:
 
 
 def _clutch(browser: Browser, address: str) -> tuple[float, ...]:
-    """Milliseconds to the first chart: from the arrival of its data, from the start, and from the start with files cached."""
+    """Milliseconds to the first chart: from the arrival of its data, from the start, and the same with the files cached."""
     context = browser.new_context()
     page = context.new_page()
     taken: list[tuple[float, float]] = []

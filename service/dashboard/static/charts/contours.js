@@ -1,11 +1,11 @@
 // Isolines of a surface over a grid, linear between its points, and the surface as panels: the isolines beside the chosen cut.
 
 import { readOut, ticksOf } from "./frame.js";
-import { blend } from "./palette.js";
+import { blend, rampOf } from "./palette.js";
 
 /** @typedef {[number, number]} Point in the grid's units */
 /** @typedef {{ x: number[], y: number[], values: Values[] }} Grid a row a y */
-/** @typedef {Grid & { name: string, color?: string, measured?: Places & { z: Values } }} Surface */
+/** @typedef {Grid & { name: string, measured: { x: number, y: number, z: number }[] }} Surface */
 
 /** @type {(corners: { at: Point, z: number }[], level: number) => { kept: Point[], ends: Point[] }} of a triangle, from a level up */
 function cut(corners, level) {
@@ -87,8 +87,11 @@ export function cutsOf(surfaces, { x, y }, wanted) {
   return { options, chosen };
 }
 
+/** @type {(points: Surface["measured"], up: "y" | "z") => Places} */
+const placesOf = (points, up) => ({ x: points.map(({ x }) => x), y: points.map((point) => point[up]) });
+
 /**
- * Isolines over x and y, filled where there is one surface; beside them z along the cut.
+ * Isolines over x and y, filled where there is one surface, of several each in a colour; beside them z along the cut.
  * @param {Surface[]} surfaces
  * @param {{ x: string, y: string, z: Axis }} titles
  * @param {{ options: [string, string][], chosen: string }} cuts
@@ -99,37 +102,36 @@ export function contoured(surfaces, { x, y, z }, { options, chosen }, c) {
   const all = surfaces.flatMap(({ values }) => values.flat().filter((value) => value !== null));
   const range = /** @type {Span} */ (z.range ?? [Math.min(...all), Math.max(...all)]);
   const levels = ticksOf(range, 400, 40).map(({ at }) => at);
+  const several = surfaces.length > 1;
+  const colour = (/** @type {number} */ index) => (several ? rampOf(c, index, surfaces.length) : c.accent);
   const [axis, text] = chosen.split(" ");
   const at = Number(text);
-  const [single] = surfaces;
   const shade = (/** @type {number} */ level) =>
     blend([c.panel, c.accent], 0.1 + (0.6 * (level - range[0])) / (range[1] - range[0]));
   const cutLine = /** @type {Line} */ ({ color: c.worn, width: 2, dash: "dash" });
-  const along = surfaces.map(({ name, color = c.accent, ...grid }) => {
-    const whole = axis === "y";
-    const rows = whole ? grid.values[grid.y.indexOf(at)] : grid.values.map((row) => between(grid.x, row, at));
-    return {
-      name,
-      x: whole ? grid.x : grid.y,
-      y: rows ?? [],
-      line: { color },
-      ...(whole ? {} : { marker: { color } }),
-    };
-  });
-  const { measured } = single;
-  const near = (measured?.y ?? []).flatMap((level, index) => (axis === "y" && level === at ? [index] : []));
+  const along = surfaces.map(({ name, x: xs, y: ys, values }, index) =>
+    axis === "y"
+      ? { name, x: xs, y: values[ys.indexOf(at)], line: { color: colour(index) } }
+      : {
+          name,
+          x: ys,
+          y: values.map((row) => between(xs, row, at)),
+          line: { color: colour(index) },
+          marker: { color: colour(index) },
+        },
+  );
+  const measured = several ? [] : surfaces[0].measured;
+  const near = measured.filter((point) => axis === "y" && point.y === at);
   return [
     {
       x: { title: x },
       y: { title: y },
-      fields: surfaces.map(({ name, color, ...grid }) => ({
-        ...grid,
-        name,
+      fields: surfaces.map((surface, index) => ({
+        ...surface,
         z: z.title,
-        levels: color ? levels : [-Infinity, ...levels],
-        ...(color ? { line: color } : { fill: shade }),
+        ...(several ? { levels, line: colour(index) } : { levels: [-Infinity, ...levels], fill: shade }),
       })),
-      curves: measured ? [{ x: measured.x, y: measured.y, marker: { color: c.quiet, size: 2 }, silent: true }] : [],
+      curves: [{ ...placesOf(measured, "y"), marker: { color: c.quiet, size: 2 }, silent: true }],
       marks: [{ [axis]: at, line: cutLine, text: "" }],
     },
     {
@@ -138,16 +140,7 @@ export function contoured(surfaces, { x, y, z }, { options, chosen }, c) {
       y: z,
       curves: [
         ...along,
-        ...(measured
-          ? [
-              {
-                name: "measured",
-                x: near.map((n) => measured.x[n]),
-                y: near.map((n) => measured.z[n]),
-                marker: { color: c.ink, size: 4 },
-              },
-            ]
-          : []),
+        { name: near.length > 0 ? "measured" : "", ...placesOf(near, "z"), marker: { color: c.ink, size: 4 } },
       ],
     },
   ];

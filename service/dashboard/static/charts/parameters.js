@@ -84,19 +84,14 @@ export function landscape({ items, name, cut }) {
   const laws = own.map(({ item }) => item.trajectory);
   const end = (/** @type {Trajectory} */ each) => each.cycles.at(-1) ?? 0;
   const x = laws.reduce((a, b) => (end(b) > end(a) ? b : a)).cycles;
-  const measured = own.flatMap(({ item: { measured: found }, pressure }) =>
-    found.cycles.map((at, index) => ({ at, pressure, value: found.value[index] })),
-  );
   const tracking = {
     name: "tracked",
     x,
     y: own.map(({ pressure }) => pressure),
     values: laws.map((each) => x.map((at) => medianAt(each, at))),
-    measured: {
-      x: measured.map(({ at }) => at),
-      y: measured.map(({ pressure }) => pressure),
-      z: measured.map(({ value }) => value),
-    },
+    measured: own.flatMap(({ item: { measured }, pressure }) =>
+      measured.cycles.map((at, index) => ({ x: at, y: pressure, z: measured.value[index] })),
+    ),
   };
   const titles = { x: "duty cycles", y: "pressure, bar", z: { title: axisOf(name) } };
   const cuts = cutsOf([tracking], titles, cut);

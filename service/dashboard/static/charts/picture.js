@@ -63,22 +63,20 @@ function write(pen, text, halo) {
   pen.translate(Number(x ?? number(text, "x")), Number(y ?? number(text, "y")));
   pen.rotate((Number(angle ?? 0) * Math.PI) / 180);
   const size = Number(inherited(text, "font-size"));
-  const fonts = [...text.children].map((span) => {
-    const share = span.getAttribute("font-size") ? 0.7 : 1;
-    return `${text.getAttribute("font-weight") ?? ""} ${share * size}px ${inherited(text, "font-family")}`;
+  const spans = [...text.children].map((span) => {
+    const own = size * (span.getAttribute("font-size") ? 0.7 : 1); // an index or an exponent
+    pen.font = `${text.getAttribute("font-weight") ?? ""} ${own}px ${inherited(text, "font-family")}`;
+    const said = span.textContent ?? "";
+    const down = own * Number.parseFloat(span.getAttribute("dy") ?? "0");
+    return { said, down, font: pen.font, width: pen.measureText(said).width };
   });
-  const widths = [...text.children].map((span, index) => {
-    pen.font = fonts[index];
-    return pen.measureText(span.textContent ?? "").width;
-  });
-  const length = widths.reduce((sum, width) => sum + width, 0);
   const anchor = { middle: 0.5, end: 1 }[text.getAttribute("text-anchor") ?? ""] ?? 0;
-  let [left, down] = [-anchor * length, 0];
-  for (const [index, span] of [...text.children].entries()) {
-    pen.font = fonts[index];
-    down += Number.parseFloat(span.getAttribute("dy") ?? "0") * (span.getAttribute("font-size") ? 0.7 : 1) * size;
-    if (halo) pen.strokeText(span.textContent ?? "", left, down);
-    pen.fillText(span.textContent ?? "", left, down);
-    left += widths[index];
+  pen.translate(-anchor * spans.reduce((sum, { width }) => sum + width, 0), 0);
+  for (const { said, down, font, width } of spans) {
+    pen.font = font;
+    pen.translate(0, down);
+    if (halo) pen.strokeText(said, 0, 0);
+    pen.fillText(said, 0, 0);
+    pen.translate(width, 0);
   }
 }

@@ -5,6 +5,7 @@ import { dot } from "./draw.js";
 import { readOut } from "./frame.js";
 
 /** @typedef {{ frame: number, name: string, x: number, y: number, u: number, v: number, text: string }} Point u, v: px */
+/** @typedef {{ u: number, v: number }} Spot px */
 /** @typedef {{ framed: Framed | null, colours: Colours | null, zooms: Zoom[], redraw: () => void }} Drawn a chart as it is drawn */
 
 /** How near the pointer has to be, and how far it has to be dragged, px. */
@@ -43,6 +44,9 @@ function pointsOf({ frames }) {
   });
 }
 
+/** @type {(from: Spot, to: Spot) => boolean} */
+const dragged = (from, to) => Math.max(Math.abs(to.u - from.u), Math.abs(to.v - from.v)) >= DRAGGED;
+
 /** @type {(points: Point[], u: number, v: number) => { point: Point | null, distance: number }} */
 function nearest(points, u, v) {
   let [found, least] = [/** @type {Point | null} */ (null), Infinity];
@@ -57,8 +61,9 @@ function nearest(points, u, v) {
 export function reading(plot, drawn) {
   /** @type {Point[][] | null} */
   let series = null;
-  let [row, column] = [-1, 0];
-  /** @type {{ frame: number, u: number, v: number } | null} where a drag began */
+  /** @type {Point | null} what is read out */
+  let read = null;
+  /** @type {(Spot & { frame: number }) | null} where a drag began */
   let start = null;
   const said = h("p.readout", { role: "status", hidden: true });
   const all = () => (series ??= drawn.framed ? pointsOf(drawn.framed) : []);
@@ -70,7 +75,8 @@ export function reading(plot, drawn) {
   }
 
   /** @param {Point} point */
-  function show({ u, v, name, text }) {
+  function show(point) {
+    const { u, v, name, text } = (read = point);
     hide();
     if (!drawn.framed || !drawn.colours) return;
     const { ink, panel } = drawn.colours;
@@ -96,34 +102,34 @@ export function reading(plot, drawn) {
       ({ l, t, inside }) => u >= l && u <= l + inside.width && v >= t && v <= t + inside.height,
     );
 
-  /** @type {(index: number, corners: { u: number, v: number }[]) => void} show what is between two corners; one side may be too short to count */
-  function zoom(index, [a, b]) {
-    const { l, t, x, y, inside } = /** @type {Framed} */ (drawn.framed).frames[index];
-    /** @type {(from: number, to: number, most: number, scale: Scale) => Span} */
-    const span = (from, to, most, scale) => {
-      if (Math.abs(to - from) < DRAGGED) return scale.range;
-      const [low, high] = [from, to].map((px) => scale.from(Math.min(most, Math.max(0, px)))).sort((p, q) => p - q);
-      return [low, high];
-    };
-    drawn.zooms[index] = { x: span(a.u - l, b.u - l, inside.width, x), y: span(a.v - t, b.v - t, inside.height, y) };
+  /** @type {(frame: Frame, a: Spot, b: Spot) => { x: Span, y: Span }} between two corners, px; a side that is too short is the whole one */
+  function boxOf({ l, t, inside }, a, b) {
+    /** @type {(from: number, to: number, start: number, length: number) => Span} */
+    const side = (from, to, start, length) =>
+      Math.abs(to - from) < DRAGGED
+        ? [0, length]
+        : [Math.max(0, Math.min(from, to) - start), Math.min(length, Math.max(from, to) - start)];
+    return { x: side(a.u, b.u, l, inside.width), y: side(a.v, b.v, t, inside.height) };
+  }
+
+  /** @type {(index: number, box: { x: Span, y: Span }) => void} show a part of a panel's axes, px */
+  function zoom(index, box) {
+    const { x, y } = /** @type {Framed} */ (drawn.framed).frames[index];
+    drawn.zooms[index] = { x: [x.from(box.x[0]), x.from(box.x[1])], y: [y.from(box.y[1]), y.from(box.y[0])] };
     drawn.redraw();
   }
 
   /** @type {(factor: number) => void} about the point that is read, or the middle */
   function zoomBy(factor) {
-    const { framed } = drawn;
-    if (!framed) return;
+    const [row, column] = placeOf(all());
     const point = all()[row]?.[column];
-    const index = point?.frame ?? 0;
-    const { x, y, inside } = framed.frames[index];
-    /** @type {(scale: Scale, middle: number, from: number, to: number) => Span} */
-    const span = (scale, middle, from, to) => [
-      scale.from(middle + (from - middle) * factor),
-      scale.from(middle + (to - middle) * factor),
-    ];
+    const frame = drawn.framed?.frames[point?.frame ?? 0];
+    if (!frame) return;
+    const { x, y, inside } = frame;
     const [u, v] = point ? [x.to(point.x), y.to(point.y)] : [inside.width / 2, inside.height / 2];
-    drawn.zooms[index] = { x: span(x, u, 0, inside.width), y: span(y, v, inside.height, 0) };
-    drawn.redraw();
+    /** @type {(middle: number, length: number) => Span} */
+    const side = (middle, length) => [middle * (1 - factor), middle + (length - middle) * factor];
+    zoom(point?.frame ?? 0, { x: side(u, inside.width), y: side(v, inside.height) });
   }
 
   function whole() {
@@ -131,26 +137,20 @@ export function reading(plot, drawn) {
     drawn.redraw();
   }
 
-  /** @type {(event: PointerEvent) => void} the rectangle that is dragged */
-  function rubber(event) {
-    const { u, v } = place(event);
+  /** @param {Spot} to the rectangle that is dragged to there */
+  function rubber(to) {
     over()?.querySelector(".rubber")?.remove();
-    if (!start || !drawn.framed || !drawn.colours) return;
-    const { l, t, inside } = drawn.framed.frames[start.frame];
-    const [wide, high] = [Math.abs(u - start.u) >= DRAGGED, Math.abs(v - start.v) >= DRAGGED];
-    const box = {
-      x: wide ? Math.min(u, start.u) : l,
-      width: wide ? Math.abs(u - start.u) : inside.width,
-      y: high ? Math.min(v, start.v) : t,
-      height: high ? Math.abs(v - start.v) : inside.height,
-    };
-    if (wide || high) over()?.append(svg("rect.rubber", { ...box, fill: drawn.colours.accent, "fill-opacity": 0.15 }));
+    const frame = drawn.framed?.frames[start?.frame ?? 0];
+    if (!start || !frame || !dragged(start, to)) return;
+    const { x, y } = boxOf(frame, start, to);
+    const box = { x: frame.l + x[0], y: frame.t + y[0], width: x[1] - x[0], height: y[1] - y[0] };
+    over()?.append(svg("rect.rubber", { ...box, fill: drawn.colours?.accent, "fill-opacity": 0.15 }));
   }
 
   /** @param {PointerEvent} event */
   function moved(event) {
-    if (start) return rubber(event);
     const { u, v } = place(event);
+    if (start) return rubber({ u, v });
     const { point, distance } = nearest(all().flat(), u, v);
     if (point && distance < NEAR) show(point);
     else hide();
@@ -172,14 +172,20 @@ export function reading(plot, drawn) {
   /** @type {(rows: number, columns: number) => void} to another point, or to the nearest one of another curve */
   function step(rows, columns) {
     const lines = all();
+    const [row, column] = placeOf(lines);
+    const clamped = (/** @type {number} */ at, /** @type {unknown[]} */ of) => Math.min(of.length - 1, Math.max(0, at));
+    const line = lines[clamped(row + rows, lines)] ?? [];
     const before = lines[row]?.[column];
-    if (before && rows === 0) column = Math.min(lines[row].length - 1, Math.max(0, column + columns));
-    else row = Math.min(lines.length - 1, Math.max(0, row + rows));
-    const line = lines[Math.max(0, row)] ?? [];
-    if (before && rows !== 0)
-      column = Math.max(0, line.indexOf(/** @type {Point} */ (nearest(line, before.u, before.v).point)));
-    if (row < 0 || !before) [row, column] = [Math.max(0, row), 0];
-    if (line[column]) show(line[column]);
+    const next = before && rows !== 0 ? nearest(line, before.u, before.v).point : line[clamped(column + columns, line)];
+    if (next) show(next);
+  }
+
+  /** @type {(lines: Point[][]) => [number, number]} curve and number of the point that is read; before the first: one before */
+  function placeOf(lines) {
+    const same = (/** @type {Point} */ { frame, name, x, y }) =>
+      frame === read?.frame && name === read.name && x === read.x && y === read.y;
+    const row = lines.findIndex((line) => line.some(same));
+    return row < 0 ? [0, -1] : [row, lines[row].findIndex(same)];
   }
 
   plot.addEventListener("pointermove", moved);
@@ -200,7 +206,7 @@ export function reading(plot, drawn) {
     start = null;
     over()?.querySelector(".rubber")?.remove();
     const to = place(event);
-    if (from && Math.max(Math.abs(to.u - from.u), Math.abs(to.v - from.v)) >= DRAGGED) zoom(from.frame, [from, to]);
+    if (from && drawn.framed && dragged(from, to)) zoom(from.frame, boxOf(drawn.framed.frames[from.frame], from, to));
   });
   plot.addEventListener("keydown", (event) => {
     const act = keys[event.key];

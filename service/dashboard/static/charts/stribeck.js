@@ -138,42 +138,35 @@ export function surface(answers) {
     y: byPressure ? "pressure, bar" : "duty cycles",
     z: { title: named(units().torque) },
   };
-  const groups =
-    over === "states"
-      ? states.map((cycles) => ({
-          name: `${fixed(cycles)} cycles`,
-          own: drawn.filter((curve) => curve.cycles === cycles),
-        }))
-      : [{ name: "fit", own: drawn }];
-  const surfaces = groups.map(({ name, own }) => ({ name, ...surfaceOf(own, byPressure, over !== "states") }));
+  const surfaces = several
+    ? states.map((at) =>
+        surfaceOf(
+          `${fixed(at)} cycles`,
+          drawn.filter(({ cycles }) => cycles === at),
+          byPressure,
+        ),
+      )
+    : [surfaceOf("fit", drawn, byPressure)];
   const cuts = cutsOf(surfaces, titles, cut);
   return {
     note: `${place}: lines of equal torque as fitted${several}, and torque along the dashed cut.`,
     columns: columnsOf(),
     rows: rowsOf(drawn),
     cuts,
-    figure: (c) => {
-      const colour = (/** @type {number} */ index) => (several ? { color: rampOf(c, index, states.length) } : {});
-      return contoured(
-        surfaces.map((each, index) => ({ ...each, ...colour(index) })),
-        titles,
-        cuts,
-        c,
-      );
-    },
+    figure: (c) => contoured(surfaces, titles, cuts, c),
   };
 }
 
-/** @type {(drawn: Drawn[], byPressure: boolean, points: boolean) => Omit<Surface, "name">} */
-function surfaceOf(drawn, byPressure, points) {
+/** @type {(name: string, drawn: Drawn[], byPressure: boolean) => Surface} */
+function surfaceOf(name, drawn, byPressure) {
   const own = drawn
-    .map((curve) => ({ ...curve, depth: byPressure ? curve.pressure : curve.cycles }))
-    .sort((a, b) => a.depth - b.depth);
-  const measured = own.flatMap((curve) => curve.measured.map((point) => ({ ...point, depth: curve.depth })));
+    .map((curve) => ({ ...curve, y: byPressure ? curve.pressure : curve.cycles }))
+    .sort((a, b) => a.y - b.y);
   return {
-    x: own[0].fitted.map(({ speed }) => speed),
-    y: own.map(({ depth }) => depth),
-    values: own.map(({ fitted }) => fitted.map(({ torque }) => torque)),
-    ...(points ? { measured: { ...xyOf(measured), y: measured.map(({ depth }) => depth), z: xyOf(measured).y } } : {}),
+    name,
+    x: xyOf(own[0].fitted).x,
+    y: own.map(({ y }) => y),
+    values: own.map(({ fitted }) => xyOf(fitted).y),
+    measured: own.flatMap(({ measured, y }) => measured.map(({ speed, torque }) => ({ x: speed, y, z: torque }))),
   };
 }

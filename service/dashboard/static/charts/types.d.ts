@@ -3,10 +3,7 @@
 type Cell = string | number | null | undefined;
 
 /** A column of a chart's table; `text` writes a number for a reader, the CSV has it raw. */
-interface Column {
-  name: string;
-  text?: (value: number) => string;
-}
+type Column = { name: string; text?: (value: number) => string };
 
 /** What a chart shows: a drawing with its table, or what is missing and how to get it; `cuts`: through a surface, and the one shown. */
 type Spec =
@@ -29,36 +26,12 @@ type Span = [number, number];
 
 /** Panels beside each other, below each other where there is no room. */
 type Figure = Panel[];
-
-interface Panel {
-  title?: string;
-  x: Axis;
-  y: Axis;
-  curves: Curve[];
-  fields?: Field[];
-  marks?: Mark[];
-}
+type Panel = { title?: string; x: Axis; y: Axis; curves: Curve[]; fields?: Field[]; marks?: Mark[] };
 
 /** `zero`: from zero on; `names`: categories at 0, 1, 2, ... */
-interface Axis {
-  title: string;
-  range?: Span;
-  zero?: boolean;
-  log?: boolean;
-  names?: string[];
-}
-
-interface Line {
-  color: string;
-  width?: number;
-  dash?: "dash" | "dot";
-}
-
-interface Marker {
-  color: string;
-  size?: number;
-  edge?: { color: string; width: number };
-}
+type Axis = { title: string; range?: Span; zero?: boolean; log?: boolean; names?: string[] };
+type Line = { color: string; width?: number; dash?: "dash" | "dot" };
+type Marker = { color: string; size?: number; edge?: { color: string; width: number } };
 
 /** A line, points or both; `half`: of error bars; with `lower` a band between two edges; `silent`: not read out. */
 interface Curve extends Places {
@@ -84,59 +57,20 @@ interface Field {
 }
 
 /** A line over the whole panel at one x or y, with a text beside it; `turned`: along the line. */
-interface Mark {
-  x?: number;
-  y?: number;
-  line: Line;
-  text: string;
-  turned?: boolean;
-}
-
-interface Size {
-  width: number;
-  height: number;
-}
-
-interface Tick {
-  at: number;
-  text: string;
-}
+type Mark = { x?: number; y?: number; line: Line; text: string; turned?: boolean };
+type Size = { width: number; height: number };
+type Tick = { at: number; text: string };
 
 /** From data to px and back. */
-interface Scale {
-  axis: Axis;
-  range: Span;
-  to: (value: number) => number;
-  from: (px: number) => number;
-  ticks: Tick[];
-}
+type Scale = { axis: Axis; range: Span; to: (value: number) => number; from: (px: number) => number; ticks: Tick[] };
 
 /** A panel with its place: the corner of its cell, of its axes, and their size. */
-interface Frame {
-  panel: Panel;
-  left: number;
-  l: number;
-  t: number;
-  bottom: number;
-  inside: Size;
-  x: Scale;
-  y: Scale;
-}
+type Frame = { panel: Panel; left: number; l: number; t: number; bottom: number; inside: Size; x: Scale; y: Scale };
 
-interface LegendEntry {
-  curve: Curve;
-  width: number;
-  x: number;
-  y: number;
-}
+type LegendEntry = { curve: Curve; width: number; x: number; y: number };
 
 /** A figure whose axes, ticks and legend have their places. */
-interface Framed {
-  frames: Frame[];
-  legend: LegendEntry[];
-  size: Size;
-  font: { size: number; family: string };
-}
+type Framed = { frames: Frame[]; legend: LegendEntry[]; size: Size; font: { size: number; family: string } };
 
 /** The part of its axes that a panel shows; none: all. */
 type Zoom = { x: Span; y: Span } | undefined;

@@ -201,18 +201,10 @@ export function answered(dialog, result) {
   });
 }
 
-/** @type {(name: string, address: string) => void} give an address's content to the user as a file */
-export function save(name, address) {
-  const link = h("a", { href: address, download: name, hidden: true });
-  document.body.append(link);
-  link.click();
-  link.remove();
-}
-
 /** @type {(name: string, content: Blob) => void} give content to the user as a file */
 export function saveBlob(name, content) {
   const address = URL.createObjectURL(content);
-  save(name, address);
+  h("a", { href: address, download: name }).click();
   setTimeout(() => URL.revokeObjectURL(address), 10_000);
 }
 
