@@ -19,6 +19,7 @@ from service.cli import (
     inspections,
     key,
     mcp,
+    report,
     runs,
     simulate,
 )
@@ -76,8 +77,8 @@ _COMMANDS: tuple[Callable[..., None], ...] = (
     clutches.list_clutches, clutches.status, clutches.watch, alarms.alarms, answers.life, answers.degradation,
     answers.loops, answers.engagement, inspections.inspect, inspections.inspections, diagnose.diagnose,
     clutches.model, runs.runs, runs.withdraw, database.restore, runs.end, runs.confirm, runs.correct, clutches.edit,
-    clutches.archive, runs.changes, export.export, mcp.mcp, fleet.score, database.replay, database.backup, database.verify,
-    database.migrate,
+    clutches.archive, runs.changes, export.export, report.report, mcp.mcp, fleet.score, database.replay, database.backup,
+    database.verify, database.migrate,
 )  # fmt: skip
 #: Names that Python or typer has for something else.
 _OTHER_NAMES: dict[Callable[..., None], str] = {importing.import_file: "import", clutches.list_clutches: "list"}

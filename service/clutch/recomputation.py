@@ -30,6 +30,7 @@ from service.clutch.notices import OF_HISTORY, OFF_TRACK, warned_again
 from service.clutch.plausibility.doubts import Judged, levelled
 from service.clutch.tracking import CARRIED, States, TrackPrediction, follow
 from service.errors import Notice
+from service.tracing import tracer
 
 if TYPE_CHECKING:
     from models.diagnosis.extension import Extension
@@ -272,6 +273,7 @@ def corrected_newest(
     return corrected_cofs(state.extension, state.record, life, runs, [test]).get(newest.run_id)
 
 
+@tracer.start_as_current_span("track")
 def track(state: ClutchHistory, *, newest: timeline.Event | None = None) -> Tracking:
     """Track what the history asks for: one step where `newest` comes last and the filters' states serve, else all of it."""
     if not state.events:

@@ -15,6 +15,7 @@ from typing import Any
 
 from service import logging
 from service.jobs.background import end_with_parent, keep_memory, use_one_blas_thread, yield_to_others
+from service.tracing import span_below
 from storage.engine.database import Database
 from storage.engine.opening import open_database
 
@@ -84,9 +85,10 @@ def main(
 def _answered(database: Database, message: bytes) -> tuple[Any, BaseException | None]:
     """What a call returns, or raises with where it was raised."""
     try:
-        function, arguments, request = pickle.loads(message)  # noqa: S301  (of our own service)
+        function, arguments, request, trace = pickle.loads(message)  # noqa: S301  (of our own service)
         logging.request_id.set(request)
-        return function(database, *arguments), None
+        with span_below(trace, function.__name__):
+            return function(database, *arguments), None
     except BaseException as error:  # noqa: BLE001  (raised again for who asked)
         error.add_note("".join(traceback.format_exception(error)))
         return None, error

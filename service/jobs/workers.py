@@ -28,6 +28,7 @@ from typing import Any
 from service.errors import BusyError
 from service.jobs import worker
 from service.logging import LogFormat, LogLevel, request_id
+from service.tracing import Carrier, carried, span_below
 from storage.engine.database import Database
 
 #: Calls of a lane that wait or run; more are refused as busy. Chosen: a minute of runs at 15 a second is 900. Of what takes
@@ -85,7 +86,8 @@ Note = Callable[[Lane, int], None]
 
 @dataclass(slots=True, eq=False, kw_only=True)
 class _Call:
-    """A call on its way, made for the request with that id; `retried` once its process ended without an answer.
+    """A call on its way, made for the request with that id, below its span `trace`; `retried` once its process ended
+    without an answer.
 
     `begun`: when it was given to a worker, None while it waits.
     """
@@ -95,6 +97,7 @@ class _Call:
     arguments: tuple[Any, ...]
     turn: str | None
     request: str
+    trace: Carrier
     seconds: float
     patience: float
     queued_at: float = field(default_factory=time.monotonic)
@@ -177,6 +180,7 @@ class Workers:
             arguments=arguments,
             turn=turn,
             request=request_id.get(),
+            trace=carried(),
             seconds=SECONDS[lane] if seconds is None else seconds,
             patience=math.inf if lane is Lane.RENEWALS else patience,
         )
@@ -388,7 +392,8 @@ class _Here(_Worker):
 
     def call(self, call: _Call) -> Any:
         request_id.set(call.request)
-        return call.function(self._database, *call.arguments)
+        with span_below(call.trace, call.function.__name__):
+            return call.function(self._database, *call.arguments)
 
 
 class _WorkerProcess(_Worker):
@@ -409,7 +414,7 @@ class _WorkerProcess(_Worker):
 
     def call(self, call: _Call) -> Any:
         try:
-            self._line.send((call.function, call.arguments, call.request))
+            self._line.send((call.function, call.arguments, call.request, call.trace))
             while not (message := self._receive()):
                 pass
         except (EOFError, OSError) as error:

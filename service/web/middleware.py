@@ -16,6 +16,7 @@ from urllib.parse import urlsplit
 from fastapi.concurrency import run_in_threadpool
 from fastapi.dependencies.utils import request_params_to_args
 from fastapi.responses import Response
+from opentelemetry.trace import Span, SpanKind
 from starlette.datastructures import Headers, MutableHeaders, QueryParams
 from starlette.middleware.gzip import GZipMiddleware
 from starlette.requests import ClientDisconnect, Request
@@ -25,6 +26,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from service.answers.store import Again
 from service.errors import BusyError, InvalidError, ServiceError, TooLargeError, TooManyError, UnsupportedMediaTypeError
 from service.logging import access, log_request, request_id, sane
+from service.tracing import span_below
 from service.web import limits
 from service.web.auth import UNMATCHED, authorise, clutch_of, context_of, query_fields, route_of, snapshot_at
 from service.web.bodies import Room
@@ -160,6 +162,10 @@ class Edge(_OfRequests):
         sent = next((value for name, value in scope["headers"] if name == b"x-request-id"), b"")
         own_id = (sane(sent) if sent else None) or secrets.token_hex(8)
         request_id.set(own_id)
+        with span_below(Headers(scope=scope), scope["method"], SpanKind.SERVER) as span:
+            await self._answered(scope, receive, send, own_id, span)
+
+    async def _answered(self, scope: Scope, receive: Receive, send: Send, own_id: str, span: Span) -> None:
         status, size, started = 0, 0, time.perf_counter()
 
         async def noting(message: Message) -> None:
@@ -183,11 +189,13 @@ class Edge(_OfRequests):
                 raise
             await unexpected(Request(scope), error)(scope, receive, noting)
         finally:
-            self._note(scope, status or 500, size, time.perf_counter() - started)
+            self._note(scope, status or 500, size, time.perf_counter() - started, span)
 
-    def _note(self, scope: Scope, status: int, size: int, seconds: float) -> None:
+    def _note(self, scope: Scope, status: int, size: int, seconds: float, span: Span) -> None:
         route = route_of(Request(scope))
         method = scope["method"] if route != UNMATCHED else "any"
+        span.update_name(f"{method} {route}")
+        span.set_attributes({"http.request.method": method, "http.route": route, "http.response.status_code": status})
         self.metrics.requests.labels(method, route, str(status)).inc()
         self.metrics.seconds.labels(method, route).observe(seconds)
         level = WARNING if status >= 500 else DEBUG if status == 304 or route in _PROBES else INFO

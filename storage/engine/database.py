@@ -15,6 +15,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, Self
 
+from opentelemetry.trace import get_tracer
 from sqlalchemy import Connection
 from sqlalchemy.exc import OperationalError, ProgrammingError
 
@@ -22,6 +23,8 @@ from storage.engine.errors import DatabaseTooOld, StorageError, StorageUnavailab
 from storage.engine.kept import Kept
 from storage.migrations.upgrade import current, head
 
+#: Spans of what writes, `store`: made where an SDK of OpenTelemetry is there.
+tracer = get_tracer("clutchlife")
 #: [s] How long a transaction waits for the write lock before it gives up with DatabaseBusy. Chosen; no table.
 LOCK_TIMEOUT = 10.0
 #: Bytes of what reading transactions found that are kept in the memory of a process. Chosen: a clutch of 1,000 tests with

@@ -15,7 +15,7 @@ import sqlalchemy as sa
 from sqlalchemy.dialects.postgresql import insert
 from sqlalchemy.exc import SQLAlchemyError
 
-from storage.engine.database import LOCK_TIMEOUT, Database, Question, SharedAnswer, Snapshot, Watch, granted
+from storage.engine.database import LOCK_TIMEOUT, Database, Question, SharedAnswer, Snapshot, Watch, granted, tracer
 from storage.engine.errors import ServiceRuns, StorageError, StorageUnavailable
 from storage.engine.integrity import refuse_newer
 from storage.engine.postgresql import connect
@@ -126,7 +126,7 @@ class ServerDatabase(Database):
     @contextmanager
     def writing(self, *, of: str | None = None) -> Iterator[sa.Connection]:
         self._refuse_closed()
-        with connect.translated(self.name), self._writers.begin() as connection:
+        with tracer.start_as_current_span("store"), connect.translated(self.name), self._writers.begin() as connection:
             connect.write_lock(connection, of)
             yield connection
             connection.execute(_COUNT)

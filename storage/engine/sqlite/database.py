@@ -16,7 +16,7 @@ from typing import Any
 from sqlalchemy import Connection
 from sqlalchemy.exc import OperationalError
 
-from storage.engine.database import LOCK_TIMEOUT, Database, Question, Snapshot, Watch, granted
+from storage.engine.database import LOCK_TIMEOUT, Database, Question, Snapshot, Watch, granted, tracer
 from storage.engine.errors import StorageUnavailable
 from storage.engine.integrity import refuse_newer
 from storage.engine.sqlite import connect
@@ -135,6 +135,7 @@ class FileDatabase(Database):
     def writing(self, *, of: str | None = None) -> Iterator[Connection]:  # noqa: ARG002  (a file has one writer)
         self._refuse_closed()
         with (
+            tracer.start_as_current_span("store"),
             self._write_lock.held(),
             connect.translated(self.path),
             connect.transaction(self._engine, "BEGIN IMMEDIATE") as connection,

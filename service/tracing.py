@@ -1,0 +1,30 @@
+"""OpenTelemetry spans, by its API alone: without an SDK in the environment they are never made.
+
+A request is a span, named after its route, below the caller's where that sends `traceparent`; each call that a worker makes
+for it is one below it, in another process too; below that are `track` and the database's `store`.
+"""
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+
+from opentelemetry import propagate, trace
+from opentelemetry.trace import Span, SpanKind
+
+tracer = trace.get_tracer("clutchlife")
+
+#: Where a span is, as headers of W3C Trace Context.
+Carrier = Mapping[str, str]
+
+
+def carried() -> Carrier:
+    """Where the present span is, to be sent along; empty without one."""
+    carrier: dict[str, str] = {}
+    propagate.inject(carrier)
+    return carrier
+
+
+@contextmanager
+def span_below(carrier: Carrier, name: str, kind: SpanKind = SpanKind.INTERNAL) -> Iterator[Span]:
+    """A span of that name, below the one that was sent along."""
+    with tracer.start_as_current_span(name, context=propagate.extract(carrier), kind=kind) as span:
+        yield span
