@@ -31,8 +31,8 @@ _VERDICTS = {
 }
 #: An axis is named where chance alone makes such a pattern less often than this.
 _SHOWN_P = 0.01
-#: Candidates that are less probable, or come after this many, are shown by `--json` only. Chosen: a screenful.
-_MIN_PROBABILITY, _MAX_CANDIDATES = 0.005, 6
+#: Candidates that are less probable, or come after this many, are shown by `--json` only. Chosen: 1 in 20; a screenful.
+_MIN_PROBABILITY, _MAX_CANDIDATES = 0.05, 6
 #: A gain in log evidence [nats] from which the evidence has this name. Derived: 2 ln B of 6 and 2 in R. E. Kass, A. E.
 #: Raftery, Bayes Factors, JASA 90, 1995, section 3.2.
 _EVIDENCE = ((3.0, "strong"), (1.0, "moderate"), (0.0, "weak"))

@@ -215,6 +215,45 @@ def test_the_heading_of_a_diagnosis_is_its_verdict(loaded: Callable[[str], Modul
     assert report("sentence", diagnosis) == "These runs leave open what is at work: oil change or inertia torque."
 
 
+def test_what_is_improbable_or_chance_is_not_listed(loaded: Callable[[str], Module]) -> None:
+    candidates = [
+        {"effect": f"cause_{n}", "title": f"Cause {n}", "probability": p, "estimate": None}
+        for n, p in enumerate((0.999, 0.3, 0.05, 0.014, 0.01, 0.006, 0.006))
+    ]
+    where = [
+        {"axis": axis, "strength": strength, "p_value": p}
+        for axis, strength, p in (
+            ("speed_rpm", 5.0, 0.0001),
+            ("cycles", 2.0, 0.009),
+            ("time_s", 0.4, 1.0),
+            ("gap", 0.2, 0.02),
+        )
+    ]
+    misfit = {"rmse_nm": 1.0, "noise_nm": 1.0, "unexplained_share": 0.0}
+    diagnosis = {"status": "finished", "verdict": "cause_named", "causes": [], "candidates": candidates}
+    said = loaded("diagnosis/report.js").evaluate(
+        f"m => m.report({json.dumps(diagnosis | {'baseline': misfit | {'where': where}})}).map((e) => e.textContent).join()"
+    )
+    assert [n for n in range(7) if f"Cause {n}" in said] == [0, 1, 2]
+    assert [word for word in ("Speed", "Cycles", "Time", "Gap") if word in said] == ["Speed", "Cycles"]
+    assert "weak" not in said
+
+
+def test_what_is_computed_is_named_with_the_seconds_so_far(loaded: Callable[[str], Module]) -> None:
+    said = loaded("shared/dom.js").evaluate("""m => {
+      const [timers, place, { setInterval, Date }] = [[], document.createElement("p"), window];
+      window.setInterval = (call) => timers.push(call);
+      m.computing(place, "the lag over cycles");
+      const first = place.textContent;
+      const later = Date.now() + 12_000;
+      window.Date = { now: () => later };
+      timers[0]();
+      Object.assign(window, { setInterval, Date });
+      return [first, place.textContent];
+    }""")
+    assert said == ["Computing the lag over cycles …", "Computing the lag over cycles for 12 s …"]
+
+
 BEFORE = {"0.05": 1000, "0.25": 1500, "0.5": 2000, "0.75": 2500, "0.95": 3000}
 AFTER = {"0.05": 3000, "0.25": 3500, "0.5": 4000, "0.75": 4500, "0.95": 5000}
 #: Width of a bar's drawing, and where its right end is in cycles for AFTER: 5 % past the larger 95 % quantile.

@@ -34,6 +34,8 @@ const SENTENCES = {
 const NOTICES = { model_adequate: "good", cause_named: "bad", cause_ambiguous: "bad", unexplained_structure: "bad" };
 
 const MOST_ROWS = 8;
+/** Other candidates than the first are listed from this probability on, and axes up to this p, as `clutchlife diagnose` does. */
+const [LEAST_PROBABILITY, MOST_P] = [0.05, 0.01];
 
 /** @type {(diagnosis: DiagnosisOut) => HTMLElement[]} the report's elements */
 export function report(diagnosis) {
@@ -117,7 +119,8 @@ const VISIBLE =
 const PARTS = {
   candidates({ candidates: all = [], causes = [] }) {
     if (all.length === 0) return null;
-    const rows = all.slice(0, MOST_ROWS).map(({ effect, title, probability: chance, estimate }) => {
+    const likely = all.filter((each, at) => at === 0 || (each.probability ?? 0) >= LEAST_PROBABILITY);
+    const rows = likely.slice(0, MOST_ROWS).map(({ effect, title, probability: chance, estimate }) => {
       const name = estimate?.name ? `${words(estimate.name)} ` : "";
       return [
         h("span", { class: causes.includes(effect) ? "named" : null, title: effect }, title || words(effect)),
@@ -166,10 +169,10 @@ const PARTS = {
   },
 
   where({ baseline }) {
-    const axes = baseline?.where ?? [];
+    const axes = (baseline?.where ?? []).filter(({ p_value: p }) => p !== null && p < MOST_P);
     if (axes.length === 0) return null;
     const rows = axes.slice(0, MOST_ROWS).map(({ axis, strength, p_value: p }) => {
-      return [quantity(axis), evidence(strength), p !== null && p < 0.001 ? "< 0.001" : significant(p, 2)];
+      return [quantity(axis), evidence(strength), (p ?? 0) < 0.001 ? "< 0.001" : significant(p, 2)];
     });
     return part("Where the baseline model is wrong", table("Where", ["Along", "Evidence", "p"], rows));
   },
