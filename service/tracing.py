@@ -4,8 +4,9 @@ A request is a span, named after its route, below the caller's where that sends 
 for it is one below it, in another process too; below that are `track` and the database's `store`.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from functools import partial
 
 from opentelemetry import propagate, trace
 from opentelemetry.trace import Span, SpanKind
@@ -21,6 +22,13 @@ def carried() -> Carrier:
     carrier: dict[str, str] = {}
     propagate.inject(carrier)
     return carrier
+
+
+def name_of(function: Callable[..., object]) -> str:
+    """A function's name, without the arguments that it already has."""
+    while isinstance(function, partial):
+        function = function.func
+    return getattr(function, "__name__", type(function).__name__)
 
 
 @contextmanager

@@ -15,7 +15,7 @@ from typing import Any
 
 from service import logging
 from service.jobs.background import end_with_parent, keep_memory, use_one_blas_thread, yield_to_others
-from service.tracing import span_below
+from service.tracing import name_of, span_below
 from storage.engine.database import Database
 from storage.engine.opening import open_database
 
@@ -87,7 +87,7 @@ def _answered(database: Database, message: bytes) -> tuple[Any, BaseException | 
     try:
         function, arguments, request, trace = pickle.loads(message)  # noqa: S301  (of our own service)
         logging.request_id.set(request)
-        with span_below(trace, function.__name__):
+        with span_below(trace, name_of(function)):
             return function(database, *arguments), None
     except BaseException as error:  # noqa: BLE001  (raised again for who asked)
         error.add_note("".join(traceback.format_exception(error)))

@@ -28,7 +28,7 @@ from typing import Any
 from service.errors import BusyError
 from service.jobs import worker
 from service.logging import LogFormat, LogLevel, request_id
-from service.tracing import Carrier, carried, span_below
+from service.tracing import Carrier, carried, name_of, span_below
 from storage.engine.database import Database
 
 #: Calls of a lane that wait or run; more are refused as busy. Chosen: a minute of runs at 15 a second is 900. Of what takes
@@ -392,7 +392,7 @@ class _Here(_Worker):
 
     def call(self, call: _Call) -> Any:
         request_id.set(call.request)
-        with span_below(call.trace, call.function.__name__):
+        with span_below(call.trace, name_of(call.function)):
             return call.function(self._database, *call.arguments)
 
 

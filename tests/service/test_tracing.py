@@ -3,6 +3,7 @@
 import pickle
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -96,7 +97,7 @@ def _named(_: Any) -> str:
 def test_the_span_of_a_request_goes_along_to_the_worker_s_process(tmp_path: Path, tracer: _Tracer) -> None:
     database = open_database(f"sqlite:///{tmp_path}/a.db")
     with span_below({"traceparent": CALLER}, "request"):
-        message = pickle.dumps((_named, (), "id", carried()))
+        message = pickle.dumps((partial(_named), (), "id", carried()))
     answer, error = worker._answered(database, message)
     database.close()
     assert error is None
