@@ -7,18 +7,11 @@ import { saveTable } from "../shared/files.js";
 import { draw } from "./draw.js";
 import { framed } from "./frame.js";
 import { colours } from "./palette.js";
-import { pngOf } from "./picture.js";
+import { pngOf, svgOf } from "./picture.js";
 import { reading } from "./reading.js";
 
-/**
- * @typedef {object} Options
- * @property {string} id
- * @property {string} title
- * @property {() => string} name the start of saved files' names
- * @property {[string, string] | null} [letter] a symbol with its index, after the title
- * @property {boolean} [wide]
- * @property {number} [height] px
- */
+/** @typedef {{ id: string, title: string, wide?: boolean, height?: number }} Place height: px */
+/** @typedef {Place & { name: () => string, letter?: [string, string] | null }} Options name: of saved files; letter: with its index */
 
 const MOST_ROWS = 400;
 const HELP = "Arrow keys read its values, + and − zoom, Escape shows all. The numbers are in the table below.";
@@ -49,15 +42,13 @@ export class Chart {
     this.forget = reading(this.plot, this);
     this.table = scrolling(`${title}: table`);
     this.details = h("details", { ontoggle: () => this.fill() }, h("summary", "Table"), this.table);
-    this.whole = this.button("Show all", "show all of it", () => {
-      this.zooms = [];
-      this.redraw();
-    });
+    this.whole = this.button("Show all", "show all of it", () => this.showAll());
+    this.whole.hidden = true;
     this.tools = h(
       "div.tools",
       this.whole,
       this.button("PNG", "save as PNG", async () => saveBlob(this.file("png"), await pngOf(this.light(SAVED), 2))),
-      this.button("SVG", "save as SVG", () => this.saveSvg()),
+      this.button("SVG", "save as SVG", () => saveBlob(this.file("svg"), svgOf(this.light(SAVED)))),
       this.button("CSV", "save data as CSV", () => this.saveTable("csv")),
       this.button("XLSX", "save data as XLSX", () => this.saveTable("xlsx")),
     );
@@ -152,9 +143,9 @@ export class Chart {
     });
   }
 
-  saveSvg() {
-    const text = new XMLSerializer().serializeToString(this.light(SAVED));
-    saveBlob(this.file("svg"), new Blob([text], { type: "image/svg+xml" }));
+  showAll() {
+    this.zooms = [];
+    this.redraw();
   }
 
   /** @param {"csv" | "xlsx"} format */

@@ -4,7 +4,6 @@ import { readOut, ticksOf } from "./frame.js";
 import { blend, rampOf } from "./palette.js";
 
 /** @typedef {[number, number]} Point in the grid's units */
-/** @typedef {{ x: number[], y: number[], values: Values[] }} Grid a row a y */
 /** @typedef {Grid & { name: string, measured: { x: number, y: number, z: number }[] }} Surface */
 
 /** @type {(corners: { at: Point, z: number }[], level: number) => { kept: Point[], ends: Point[] }} of a triangle, from a level up */

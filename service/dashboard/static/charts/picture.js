@@ -13,6 +13,9 @@ export function pngOf(drawing, scale) {
   });
 }
 
+/** @type {(drawing: SVGSVGElement) => Blob} */
+export const svgOf = (drawing) => new Blob([new XMLSerializer().serializeToString(drawing)], { type: "image/svg+xml" });
+
 /** @type {(node: Element, name: string) => number} */
 const number = (node, name) => Number(node.getAttribute(name) ?? 0);
 

@@ -6,7 +6,7 @@ import { readOut } from "./frame.js";
 
 /** @typedef {{ frame: number, name: string, x: number, y: number, u: number, v: number, text: string }} Point u, v: px */
 /** @typedef {{ u: number, v: number }} Spot px */
-/** @typedef {{ framed: Framed | null, colours: Colours | null, zooms: Zoom[], redraw: () => void }} Drawn a chart as it is drawn */
+/** @typedef {{ framed: Framed | null, colours: Colours | null, zooms: Zoom[], redraw: () => void, showAll: () => void }} Drawn a chart as it is drawn */
 
 /** How near the pointer has to be, and how far it has to be dragged, px. */
 const [NEAR, DRAGGED] = [60, 12];
@@ -132,11 +132,6 @@ export function reading(plot, drawn) {
     zoom(point?.frame ?? 0, { x: side(u, inside.width), y: side(v, inside.height) });
   }
 
-  function whole() {
-    drawn.zooms.length = 0;
-    drawn.redraw();
-  }
-
   /** @param {Spot} to the rectangle that is dragged to there */
   function rubber(to) {
     over()?.querySelector(".rubber")?.remove();
@@ -166,7 +161,7 @@ export function reading(plot, drawn) {
     End: () => step(0, Infinity),
     "+": () => zoomBy(0.5),
     "-": () => zoomBy(2),
-    Escape: whole,
+    Escape: () => drawn.showAll(),
   };
 
   /** @type {(rows: number, columns: number) => void} to another point, or to the nearest one of another curve */
@@ -191,7 +186,7 @@ export function reading(plot, drawn) {
   plot.addEventListener("pointermove", moved);
   plot.addEventListener("pointerleave", () => !start && hide());
   plot.addEventListener("click", (event) => moved(/** @type {PointerEvent} */ (event)));
-  plot.addEventListener("dblclick", whole);
+  plot.addEventListener("dblclick", () => drawn.showAll());
   plot.addEventListener("pointercancel", () => (start = null));
   plot.addEventListener("pointerdown", (event) => {
     const { u, v } = place(event);

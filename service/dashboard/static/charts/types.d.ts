@@ -34,27 +34,12 @@ type Line = { color: string; width?: number; dash?: "dash" | "dot" };
 type Marker = { color: string; size?: number; edge?: { color: string; width: number } };
 
 /** A line, points or both; `half`: of error bars; with `lower` a band between two edges; `silent`: not read out. */
-interface Curve extends Places {
-  name?: string;
-  line?: Line;
-  marker?: Marker;
-  half?: number[];
-  lower?: Places;
-  fill?: string;
-  silent?: boolean;
-}
+type Curve = Places & Partial<{ name: string; line: Line; marker: Marker; half: number[]; silent: boolean } & Band>;
+type Band = { lower: Places; fill: string };
 
 /** Values over a grid: coloured cells, or isolines at `levels`, filled where `fill` is given; `z`: what the values are. */
-interface Field {
-  name?: string;
-  z: string;
-  x: number[];
-  y: number[];
-  values: Values[];
-  levels?: number[];
-  fill?: (value: number) => string;
-  line?: string;
-}
+type Grid = { x: number[]; y: number[]; values: Values[] };
+type Field = Grid & { name?: string; z: string; levels?: number[]; fill?: (value: number) => string; line?: string };
 
 /** A line over the whole panel at one x or y, with a text beside it; `turned`: along the line. */
 type Mark = { x?: number; y?: number; line: Line; text: string; turned?: boolean };

@@ -4,7 +4,7 @@
 
 import { read, send } from "../shared/api.js";
 import { agreed } from "../shared/dialog.js";
-import { button, h, quiet } from "../shared/dom.js";
+import { button, computing, h, quiet } from "../shared/dom.js";
 import { words } from "../shared/format.js";
 import { attempted } from "../shared/problem_view.js";
 import { charts } from "./charts.js";
@@ -58,9 +58,8 @@ export function diagnosisTab(place, reader, changed) {
   function draw(found) {
     latest = found;
     if (latest === null || latest.status === "running") {
-      const never = latest === null;
-      const text = never ? NEVER_RUN : "A diagnosis is under way …";
-      content.replaceChildren(h("p", { class: never ? "quiet" : null }, text));
+      if (latest === null) content.replaceChildren(quiet(NEVER_RUN));
+      else computing(content, "the diagnosis", Date.parse(latest.created_at));
       figures.hidden = true;
       return;
     }

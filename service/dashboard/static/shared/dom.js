@@ -8,6 +8,7 @@
  */
 
 import { at } from "./api.js";
+import { inWords } from "./words.js";
 
 const SVG = "http://www.w3.org/2000/svg";
 
@@ -56,7 +57,8 @@ function filled(element, classes, [first, ...children]) {
     else element.setAttribute(key, value === true ? "" : String(value));
   }
   const flat = /** @type {Child[]} */ (children.flat(2));
-  element.append(...flat.filter((child) => child !== null && child !== undefined && child !== false));
+  const shown = flat.filter((child) => child !== null && child !== undefined && child !== false);
+  element.append(...shown.map((child) => (typeof child === "string" ? inWords(child) : child)));
   return element;
 }
 
@@ -116,9 +118,8 @@ export function form(submit, ...content) {
   return h("form", { autocomplete: "off", onsubmit }, ...content);
 }
 
-/** @type {(place: Element, what: string) => void} say in a place what is computed, and for how long, until something else stands there */
-export function computing(place, what) {
-  const start = Date.now();
+/** @type {(place: Element, what: string, start?: number) => void} say in a place what is computed, and for how long, until something else stands there */
+export function computing(place, what, start = Date.now()) {
   const line = h("span", `Computing ${what} …`);
   place.replaceChildren(line);
   const timer = setInterval(() => {

@@ -58,25 +58,13 @@ export function parsed(csv) {
 const HEAD = '<?xml version="1.0" encoding="UTF-8" standalone="yes"?>\n';
 const OFFICE = "http://schemas.openxmlformats.org";
 const TYPE = "application/vnd.openxmlformats-officedocument.spreadsheetml";
-/** @type {[string, string][]} all of the file but the rows */
-const PARTS = [
-  [
-    "[Content_Types].xml",
-    `<Types xmlns="${OFFICE}/package/2006/content-types"><Default Extension="rels" ContentType="application/vnd.openxmlformats-package.relationships+xml"/><Override PartName="/xl/workbook.xml" ContentType="${TYPE}.sheet.main+xml"/><Override PartName="/xl/sheet.xml" ContentType="${TYPE}.worksheet+xml"/></Types>`,
-  ],
-  [
-    "_rels/.rels",
-    `<Relationships xmlns="${OFFICE}/package/2006/relationships"><Relationship Id="r1" Type="${OFFICE}/officeDocument/2006/relationships/officeDocument" Target="xl/workbook.xml"/></Relationships>`,
-  ],
-  [
-    "xl/workbook.xml",
-    `<workbook xmlns="${OFFICE}/spreadsheetml/2006/main" xmlns:r="${OFFICE}/officeDocument/2006/relationships"><sheets><sheet name="Data" sheetId="1" r:id="r1"/></sheets></workbook>`,
-  ],
-  [
-    "xl/_rels/workbook.xml.rels",
-    `<Relationships xmlns="${OFFICE}/package/2006/relationships"><Relationship Id="r1" Type="${OFFICE}/officeDocument/2006/relationships/worksheet" Target="sheet.xml"/></Relationships>`,
-  ],
-];
+/** All of the file but the rows. */
+const PARTS = {
+  "[Content_Types].xml": `<Types xmlns="${OFFICE}/package/2006/content-types"><Default Extension="rels" ContentType="application/vnd.openxmlformats-package.relationships+xml"/><Override PartName="/xl/workbook.xml" ContentType="${TYPE}.sheet.main+xml"/><Override PartName="/xl/sheet.xml" ContentType="${TYPE}.worksheet+xml"/></Types>`,
+  "_rels/.rels": `<Relationships xmlns="${OFFICE}/package/2006/relationships"><Relationship Id="r1" Type="${OFFICE}/officeDocument/2006/relationships/officeDocument" Target="xl/workbook.xml"/></Relationships>`,
+  "xl/workbook.xml": `<workbook xmlns="${OFFICE}/spreadsheetml/2006/main" xmlns:r="${OFFICE}/officeDocument/2006/relationships"><sheets><sheet name="Data" sheetId="1" r:id="r1"/></sheets></workbook>`,
+  "xl/_rels/workbook.xml.rels": `<Relationships xmlns="${OFFICE}/package/2006/relationships"><Relationship Id="r1" Type="${OFFICE}/officeDocument/2006/relationships/worksheet" Target="sheet.xml"/></Relationships>`,
+};
 
 /** @param {string} text */
 const escaped = (text) =>
@@ -97,10 +85,10 @@ function cell(value) {
 export function xlsxOf(rows) {
   const lines = rows.map((row) => `<row>${row.map(cell).join("")}</row>`).join("");
   const sheet = `<worksheet xmlns="${OFFICE}/spreadsheetml/2006/main"><sheetData>${lines}</sheetData></worksheet>`;
-  return new Blob(zipped([...PARTS, ["xl/sheet.xml", sheet]]), { type: `${TYPE}.sheet` });
+  return new Blob(zipped({ ...PARTS, "xl/sheet.xml": sheet }), { type: `${TYPE}.sheet` });
 }
 
-/** @type {(parts: [string, string][]) => Uint8Array<ArrayBuffer>[]} texts as a zip file, not compressed */
+/** @type {(parts: Record<string, string>) => Uint8Array<ArrayBuffer>[]} texts as a zip file, not compressed */
 function zipped(parts) {
   const encoder = new TextEncoder();
   /** @type {Uint8Array<ArrayBuffer>[]} */
@@ -108,7 +96,7 @@ function zipped(parts) {
   /** @type {Uint8Array<ArrayBuffer>[]} */
   const central = [];
   let offset = 0;
-  for (const [path, text] of parts) {
+  for (const [path, text] of Object.entries(parts)) {
     const [name, data] = [encoder.encode(path), encoder.encode(HEAD + text)];
     // version, flags, method, time, date; checksum, sizes; lengths of the name and of nothing more
     const shared = [20, 0, 0, 0, 33, crc32(data), data.length, data.length, name.length, 0];
@@ -119,7 +107,7 @@ function zipped(parts) {
     offset += head.length + name.length + data.length;
   }
   const size = central.reduce((sum, part) => sum + part.length, 0);
-  const count = parts.length;
+  const { length: count } = Object.keys(parts);
   const end = bytes([4, 2, 2, 2, 2, 4, 4, 2], [0x06054b50, 0, 0, count, count, size, offset, 0]);
   return [...local, ...central, end];
 }

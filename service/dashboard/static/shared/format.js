@@ -136,13 +136,7 @@ export function age(moment, now = Date.now()) {
 /** @type {(text: string | null | undefined) => string} a moment on the reader's clock; `text`: ISO 8601 */
 export function moment(text) {
   if (!text) return NONE;
-  return new Date(text).toLocaleString("en-GB", {
-    day: "numeric",
-    month: "short",
-    year: "numeric",
-    hour: "2-digit",
-    minute: "2-digit",
-  });
+  return new Date(text).toLocaleString("en-GB", { dateStyle: "medium", timeStyle: "short" });
 }
 
 /** @param {Date} when */
