@@ -135,6 +135,7 @@ def test_a_slip_of_typing_makes_no_clutch(watched: Watched, server: Server) -> N
     drop(page, {"stationary-4000.csv": sheet(4000)})
     dialog = page.get_by_role("dialog", name="Send a run")
     dialog.get_by_label("Clutch", exact=True).fill("bench3-17")
+    dialog.get_by_text("Ready to send.").wait_for()  # kind and cycles are suggested by then
     dialog.get_by_role("button", name="Send").click()
     form = page.get_by_role("dialog", name="Register a clutch")
     form.get_by_text("No clutch is registered as “bench3-17”").wait_for()
