@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from models.arrays import FloatArray
 from service.errors import InvalidError, Notice
 from service.readers.column_names import column_of, recognised
+from service.readers.constants import in_parts
 from service.readers.limits import Limits
 from service.readers.meanings import known_channel
 from service.readers.numerals import Stamps, is_stamp
@@ -66,12 +67,24 @@ def table_of(tree: Tree, reading: Reading, limits: Limits, unread: tuple[str, ..
     """
     sources = list(_sources(_paired(tree), "", 0, {}, Stamps({}, set())))
     groups = tuple(dict.fromkeys(source.column.group for source in sources))
-    if reading.table:
-        chosen = groups[index_of_wanted(groups, reading.table, "group")]
-        sources = [source for source in sources if source.column.group == chosen]
-    elif len(knowing := _complete(sources)) > 1:
-        index_of_wanted(knowing, "", "group")
     left_out = ", ".join(unread[:10])
+    notices = (
+        (Notice(code="not_read", message=f"left out, because only MATLAB can read it: {left_out}"),) if unread else ()
+    )
+    of_groups = {name: [source for source in sources if source.column.group == name] for name in groups}
+
+    def table(own: list[_Source], name: str) -> Table:
+        limits.require_columns(len(own))
+        if len({source.column.group for source in own}) == 1:
+            own = [replace(source, column=replace(source.column, group="")) for source in own]
+
+        def read(taken: Mapping[int, str]) -> list[NDArray[Any]]:
+            return [_values(own[index]) for index in taken]
+
+        columns = tuple(source.column for source in own)
+        above = tuple((key, f"{value}") for key, value in _stated_of(tree, name).items())
+        return Table(columns=columns, read=read, name=name, others=groups, above=above, notices=notices)
+
     if not sources:
         hint = (
             f": only MATLAB can read {left_out}. Save the channels as arrays, or as a struct of arrays"
@@ -80,16 +93,22 @@ def table_of(tree: Tree, reading: Reading, limits: Limits, unread: tuple[str, ..
         )
         message = f"the file holds no array of numbers that could be a channel{hint}"
         raise InvalidError.of(message, code="no_arrays")
-    limits.require_columns(len(sources))
-    if len({source.column.group for source in sources}) == 1:
-        sources = [replace(source, column=replace(source.column, group="")) for source in sources]
+    if reading.reads_all():
+        return in_parts([table(own, name) for name, own in of_groups.items()])
+    if reading.table:
+        name = groups[index_of_wanted(groups, reading.table, "group")]
+        return table(of_groups[name], name)
+    if len(knowing := _complete(sources)) > 1:
+        index_of_wanted(knowing, "", "group")
+    return table(sources, "")
 
-    def read(taken: Mapping[int, str]) -> list[NDArray[Any]]:
-        return [_values(sources[index]) for index in taken]
 
-    notice = Notice(code="not_read", message=f"left out, because only MATLAB can read it: {left_out}")
-    columns, notices = tuple(source.column for source in sources), (notice,) if unread else ()
-    return Table(columns=columns, read=read, name=reading.table, others=groups, notices=notices)
+def _stated_of(tree: Tree, group: str) -> dict[str, float | str]:
+    """What a folder states, by its path."""
+    for name in filter(None, group.split("/")):
+        held = tree.get(name)
+        tree = held if isinstance(held, Mapping) else {}
+    return _scalars(tree)
 
 
 def _paired(tree: Tree) -> Tree:

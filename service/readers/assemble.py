@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from models.arrays import FloatArray
 from models.records.cleaning import stands
-from service.channels import check_columns
+from service.channels import LineOf, check_columns, place
 from service.errors import MAX_QUOTED, InvalidError, Notice, TooLargeError
 from service.readers.column_names import (
     Taken,
@@ -28,13 +28,19 @@ from service.readers.column_names import (
     perhaps_the_time,
     several_times,
 )
-from service.readers.constants import constants, stacked_columns
+from service.readers.constants import constants, stacked_columns, with_constants
 from service.readers.limits import Limits
 from service.readers.long_table import says_valid, valid_rows, widened
 from service.readers.meanings import known_channel
-from service.readers.missing_values import drop_totals, mask_stated_marks, refuse_stand_ins
+from service.readers.missing_values import (
+    drop_totals,
+    mask_stated_marks,
+    refuse_no_torque,
+    refuse_other_unit,
+    refuse_stand_ins,
+)
 from service.readers.numerals import empty_cells, plain, read_cells
-from service.readers.table import NO_TIME, Clock, FileColumn, Reading, Table, index_of_wanted, labels, marks
+from service.readers.table import ABOVE, NO_MISSING, NO_TIME, Clock, FileColumn, Reading, Table, index_of_wanted, labels
 from service.readers.unit_table import conversion
 
 #: The code of the notice that lists unused columns.
@@ -53,6 +59,8 @@ _COUNTED = {"ms since 1970": 1e3, "µs since 1970": 1e6, "ns since 1970": 1e9}
 _COUNTED |= {"100 ns since 1601": 1e7, "100 ns since 0001": 1e7}
 #: Empty cells that show a channel of a lower rate. Chosen: fewer may have been left empty by hand.
 _MIN_GAPS = 4
+#: Values of a channel that are fewer than those of one that was recorded at a lower rate. Chosen: levels of a test.
+_FEW = 20
 #: The share of a clock's steps that go on. Chosen: times that are rounded to half a step stand still at every second.
 _MOST_OF = 0.9
 #: Columns that one notice names.
@@ -86,7 +94,9 @@ def to_channels(table: Table, reading: Reading, limits: Limits) -> Channels:
     Raises InvalidError where a unit or a clock is not clear, a value is no number, or nothing is known; TooLargeError on too
     many values.
     """
-    table, reading = widened(stacked_columns(table, reading), reading)
+    if table.parts:
+        return below_each_other([to_channels(part, reading, limits) for part in _parts(table)])
+    table, reading = widened(stacked_columns(with_constants(table, reading), reading), reading)
     constant = constants(table, reading)
     chosen = choose(table.columns, reading)
     series, table, counts = _read(table, chosen, reading, limits)
@@ -95,6 +105,8 @@ def to_channels(table: Table, reading: Reading, limits: Limits) -> Channels:
     columns, first = _chosen_table(columns, table, reading)
     size = next(iter(columns.values())).size
     columns |= {channel: np.full(size, value) for channel, value in constant.items()}
+    if reading.reads_all() and "time_s" in columns:
+        columns["time_s"] = _continued(columns["time_s"])
     line_in_file = table.line_of
     line_of = None if line_in_file is None else lambda row: line_in_file(first + row)
     try:
@@ -106,7 +118,39 @@ def to_channels(table: Table, reading: Reading, limits: Limits) -> Channels:
         detail = f"{error.detail}: add missing={value} to leave such rows out"
         raise InvalidError(detail, errors=error.errors, total=error.total) from None
     _refuse_standing(columns)
+    refuse_no_torque(columns, line_of, reading)
+    refuse_other_unit(columns, line_of, reading)
     return Channels(columns=columns, notices=tuple(notices), counts=counts, labels=labels(table.above))
+
+
+def _parts(table: Table) -> list[Table]:
+    """The parts of a file, each without the others."""
+    return [replace(part, parts=()) for part in table.parts]
+
+
+def below_each_other(parts: Sequence[Channels]) -> Channels:
+    """The channels of a file's parts as one: those that all have, with times that go on. Raises InvalidError where they
+    have none in common."""
+    names = [name for name in parts[0].columns if all(name in part.columns for part in parts)]
+    columns = {name: np.concatenate([part.columns[name] for part in parts]) for name in names}
+    if not columns:
+        message = "the parts of the file have no channel in common: choose one with table=NAME"
+        raise InvalidError.of(message, code="which_table", pointer="/table")
+    if "time_s" in columns:
+        columns["time_s"] = _continued(columns["time_s"])
+    notices = tuple(dict.fromkeys(notice for part in parts for notice in part.notices))
+    message = f"{len(parts)} parts of the file were read one below the other"
+    notices += (Notice(code="stacked", message=message),)
+    return Channels(columns=columns, notices=notices, counts=all(part.counts for part in parts), labels=parts[0].labels)
+
+
+def _continued(times: FloatArray) -> FloatArray:
+    """Times [n] that begin again with each part of a file, as those of one record."""
+    steps = np.diff(times)
+    back = steps < 0
+    usual = float(np.median(steps[~back])) if not back.all() else 1.0
+    shifts = np.where(back, usual - steps, 0.0)
+    return times + np.concatenate([[0.0], np.cumsum(shifts)]) if back.any() else times
 
 
 def _refuse_standing(columns: Mapping[str, FloatArray]) -> None:
@@ -127,6 +171,8 @@ def _chosen_table(columns: dict[str, FloatArray], table: Table, reading: Reading
 
     Titles that only interrupt a table, whose time goes on after them, begin no other.
     """
+    if reading.reads_all():
+        return columns, 0
     time_s = columns.get("time_s")
     starts = [0, *table.breaks, next(iter(columns.values())).size]
     tables = [f"{table.name}/{number}" if table.name else str(number) for number in range(1, len(starts))]
@@ -274,7 +320,7 @@ def _read(
     timed = [at for at in _may_be_clocks(table, channels, reading) if at not in parts]
     beside = dict.fromkeys(says, "") | dict.fromkeys([*parts, *timed], "time_s")
     read = read_cells(table, beside | channels, reading)
-    read |= {index: mask_stated_marks(read[index], reading) for index in indices}
+    read |= {index: mask_stated_marks(read[index], reading, channels[index]) for index in indices}
     read, table = drop_totals(read, [column.index for column in chosen if column.channel != "time_s"], table)
     for column in chosen:
         refuse_stand_ins(column.channel, read[column.index], table.line_of, reading)
@@ -309,7 +355,7 @@ def _read(
             clock = clocks.get(column.index)
             key = None if clock is None else clock.key
             whole = _Series(values[column.index], valid[column.index], key, times.get(key))
-            own = _drop_empty_rows(column.channel, whole, table, bool(marks(reading.missing)))
+            own = _drop_empty_rows(column.channel, whole, table, reading.missing not in ("", NO_MISSING))
             series[column.channel] = own
             for good in marked:
                 if good is not None and good.size == own.values.size:
@@ -337,16 +383,38 @@ def _drop_empty_rows(name: str, own: _Series, table: Table, leave_out: bool) -> 
         keep = ~timeless if leave_out else ~(missing & timeless)
         gaps = np.count_nonzero(missing & keep)
         if gaps >= _MIN_GAPS and 2 * gaps >= np.count_nonzero(keep) - 1:
+            if not leave_out and name in _LEADING and _is_held(missing[keep]):
+                raise _which_is_empty(name, missing, table.line_of)
             keep &= ~missing
         if not keep.all():
             valid = None if own.valid is None else own.valid[keep]
             own = _Series(own.values[keep], valid, (own.clock, name), own.times[keep])
             missing, invalid = missing[keep], None if invalid is None else invalid[keep]
     if table.line_of is not None and not leave_out and invalid is not None and not invalid.all():
+        if name in ("pressure_bar", "speed_rpm") and not missing[0] and 2 * np.count_nonzero(missing) > missing.size:
+            raise _which_is_empty(name, missing, table.line_of)
         raise empty_cells(name, np.flatnonzero(~invalid).tolist(), table.line_of, missing.size - 1)
     if own.times is not None and table.line_of is not None and np.isnan(own.times).any():
         raise empty_cells("time_s", np.flatnonzero(np.isnan(own.times)).tolist(), table.line_of, own.times.size - 1)
     return own
+
+
+def _is_held(missing: NDArray[np.bool_]) -> bool:
+    """Whether a channel with so many empty cells [n] may hold its last value there: it has few values, or none for long."""
+    filled = np.flatnonzero(~missing)
+    apart = np.diff([*filled, missing.size])
+    return bool(filled.size < _FEW or apart.max() > _LONGEST_PAUSE * np.median(apart))
+
+
+def _which_is_empty(name: str, missing: NDArray[np.bool_], line_of: LineOf | None) -> InvalidError:
+    """The error of a channel that has a value in some rows only."""
+    row = int(missing.argmax())
+    message = (
+        f"{place(name, row, line_of)} is empty, as in {np.count_nonzero(missing)} of {missing.size} rows. If an empty cell "
+        f"holds the value above it, add missing={ABOVE}; to leave out such rows, or where the channel was recorded at a "
+        "lower rate, add missing=empty"
+    )
+    return InvalidError.of(message, code="not_a_number", pointer=f"/channels/{name}/{row}", row=row + 1)
 
 
 def _numbers(column: Taken, values: NDArray[Any], start: Any) -> tuple[FloatArray, NDArray[np.bool_] | None]:

@@ -23,7 +23,7 @@ from service.readers.meanings import (
     of_time,
     words,
 )
-from service.readers.table import NO_TIME, ColumnChoice, FileColumn, Reading
+from service.readers.table import CELLS, COLUMNS, NO_TIME, SHEETS, ColumnChoice, FileColumn, Reading
 from service.readers.unit_table import Conversion, conversion, is_unit, spellings
 
 #: Times whose program writes seconds and no unit: LabVIEW's text files, asammdf's exports, Simulink's.
@@ -172,7 +172,10 @@ def parse_map(mapping: str | None) -> dict[str, ColumnChoice]:
             raise _wrong_map(channel, f"must name channels from {', '.join(CHANNELS)}")
         if channel in choices:
             raise _wrong_map(channel, "must name each channel once")
-        choices[channel] = ColumnChoice(column=name)
+        pseudo = next((own for own in (COLUMNS, SHEETS, CELLS) if name.partition(" ")[0] == own), None)
+        choices[channel] = (
+            ColumnChoice(column=pseudo, unit=column_of(name).unit) if pseudo else ColumnChoice(column=name)
+        )
     return choices
 
 
@@ -230,8 +233,9 @@ def understood(columns: Sequence[FileColumn], reading: Reading) -> tuple[list[Ta
     if reading.time == NO_TIME:
         named.pop("time_s", None)
     by_map: dict[int, str] = {}
+    titles = {column.title for column in columns}
     for channel, choice in named.items():
-        if choice.is_constant():
+        if choice.is_constant() and choice.column not in titles:
             continue
         try:
             if (index := _find(columns, channel, choice.column)) in by_map:
@@ -339,9 +343,15 @@ def no_unit(columns: Sequence[tuple[str, FileColumn]], reading: Reading) -> Inva
 
 
 def _find(columns: Sequence[FileColumn], channel: str, name: str) -> int:
-    """The index of the column that a map names: by its exact title or name, else whatever its case, blanks and unit."""
-    wanted, forms = key(column_of(name).name), [(own.title, own.name, f"{own.group}/{own.name}") for own in columns]
+    """The index of the column that a map names: by its exact title or name, by both name and unit, or by its number among
+    equal ones (`M#2`), else whatever its case, blanks and unit."""
+    wanted = key(column_of(name).name)
+    forms = [(own.title, own.name, f"{own.group}/{own.name}", f"{own.name} [{own.unit}]") for own in columns]
     exact = [index for index, names in enumerate(forms) if name in names]
+    bare, _, number = name.rpartition("#")
+    if not exact and number.isdecimal():
+        equal = [index for index, names in enumerate(forms) if bare in names]
+        exact = equal[int(number) - 1 : int(number)] if int(number) else []
     alike = [index for index, column in enumerate(columns) if key(column.name) == wanted]
     for matches in (exact, alike):
         if len(matches) == 1:
@@ -358,7 +368,7 @@ def _twice(channel: str, *columns: FileColumn) -> InvalidError:
         names = [column.title[:MAX_QUOTED] or column.shown() for column in columns]
     shown = " and ".join(names[:_MAX_NAMED])
     distinct = len(set(names)) == len(names)
-    way = f"choose one with map={channel}:NAME" if distinct else "give the columns different names"
+    way = f"choose one with map={channel}:{'NAME' if distinct else names[0] + '#1'}"
     message = f"{channel} must be one column, got {shown}; {way}"
     if channel == "speed_rpm":
         message += ". It is the sliding speed: if the columns hold the speeds of both sides, send the difference"

@@ -1,11 +1,14 @@
-"""A channel that no column holds: `=5 bar`, `=LABEL` of a cell above the table, `=columns`, `=sheets`.
+"""A channel that no column holds: `=5 bar`, `=LABEL` of a cell above the table, `=columns`, `=sheets`; and files in parts.
 
-The last two stand for a value in the titles of columns (`M @ 3 bar`, `M @ 5 bar`) or in the names of sheets, whose rows are
-read one part below the other, with a column of that title for the channel.
+`=columns` stands for a value in the titles of columns (`M @ 3 bar`, `M @ 5 bar`; or `3`, `5` over cells that are one
+quantity, `=cells`), whose rows are read one part below the other, with a column of that title for the channel. The parts of
+a file are its sheets, groups or archived files, and blocks below each other: `=sheets` is a value in their names, or in the
+lines above each.
 """
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -15,30 +18,93 @@ from numpy.typing import NDArray
 from service.channels import CHANNELS
 from service.errors import MAX_QUOTED, InvalidError, Notice
 from service.readers.column_names import column_of
-from service.readers.table import COLUMNS, ColumnChoice, FileColumn, Reading, Table, labels
+from service.readers.table import CELLS, COLUMNS, SHEETS, ColumnChoice, FileColumn, Reading, Table, labels
 from service.readers.unit_table import conversion, spellings
 
 _NUMBER = re.compile(r"(?P<number>[+-]?\d+(?:[.,]\d+)?)\s*(?P<unit>\S.*)?")
 #: A value with its unit within a title, and what may stand around it.
 _WITHIN = re.compile(
-    r"[@(\[{,;:_ ]*(?:\b(?:at|bei|p) ?=? ?)?(?<![^\W_])(?P<number>\d+(?:[.,]\d+)?) ?(?P<unit>[^\W\d_]+)(?![^\W_])[)\]}]*"
+    r"[@(\[{,;:_ ]*(?:\b(?:at|bei|p) ?=? ?|(?<![^\W_]))(?P<number>\d+(?:[.,]\d+)?) ?(?P<unit>[^\W\d_]+)(?![^\W_])[)\]}]*"
 )
-#: Reads columns by their index and what each is for, once for each part.
-_ReadParts = Callable[[Mapping[int, str]], Sequence[Sequence[NDArray[Any]]]]
 
 
 def constants(table: Table, reading: Reading) -> dict[str, float]:
-    """The channels that are constant by the caller's word, in their units. Raises InvalidError where a value or its unit is
-    not clear."""
+    """The channels that are constant in the whole table by the caller's word, in their units; of a file in parts none.
+
+    Raises InvalidError where a value or its unit is not clear.
+    """
+    if reading.reads_all():
+        return {}
+    stated = labels(table.above)
     return {
-        channel: _value(channel, choice, table) for channel, choice in reading.mapping.items() if choice.is_constant()
+        channel: _value(channel, choice, stated) for channel, choice in reading.mapping.items() if choice.is_constant()
     }
 
 
-def _value(channel: str, choice: ColumnChoice, table: Table) -> float:
+def with_constants(table: Table, reading: Reading) -> Table:
+    """The table with a column for each channel that is constant in each of its blocks, for a file that is read in parts.
+
+    A value is what the caller states, or stands in the lines above each block, or with `=sheets` in the table's name.
+    Raises InvalidError, once it is read, where a value or its unit is not clear.
+    """
+    asked = {of: own for of, own in reading.mapping.items() if own.is_constant() or own.column == SHEETS}
+    if not reading.reads_all() or not asked:
+        return table
+    width, others = len(table.columns), list(asked)
+
+    def read(taken: Mapping[int, str]) -> list[NDArray[Any]]:
+        held = {index: name for index, name in taken.items() if index < width} or {0: ""}
+        columns = dict(zip(held, table.read(held), strict=True))
+        sizes = np.diff([0, *table.breaks, len(next(iter(columns.values())))])
+        heads = table.heads or [table.above]
+        for index in taken.keys() - held.keys():
+            values = [
+                _value_of(others[index - width], asked[others[index - width]], table.name, head) for head in heads
+            ]
+            columns[index] = np.repeat(values, sizes)
+        return [columns[index] for index in taken]
+
+    more = [FileColumn(own.column, CHANNELS[of].unit, title=own.column) for of, own in asked.items()]
+    return replace(table, columns=(*table.columns, *more), read=read)
+
+
+def _value_of(channel: str, choice: ColumnChoice, name: str, head: Sequence[Sequence[str]]) -> float:
+    """A channel's value in one block, by the lines above it."""
+    if choice.column != SHEETS:
+        return _value(channel, choice, labels(head))
+    value = value_of_part(name, head, channel)
+    if value is None:
+        part = repr(name[:MAX_QUOTED])
+        message = f"map gives {channel} the values in the names of the file's parts, of which one states none: {part}"
+        raise InvalidError.of(message, code="invalid_map", pointer="/map", value=SHEETS)
+    return value
+
+
+def value_of_part(name: str, head: Sequence[Sequence[str]], channel: str) -> float | None:
+    """A value of a channel that the name of a part of a file states, or else the lines above it, the nearest first."""
+    for text in (name.replace("_", " "), *(" ".join(filter(None, row)) for row in reversed(head))):
+        if held := value_within(text, channel):
+            return held[0]
+    return None
+
+
+def in_parts(tables: Sequence[Table]) -> Table:
+    """Tables of one file as one that is read in parts: those with the titles that most of them have."""
+    titles = [tuple(column.name for column in table.columns) for table in tables]
+    usual = Counter(titles).most_common(1)[0][0]
+    parts = [table for table, own in zip(tables, titles, strict=True) if own == usual]
+    out = ", ".join(table.name[:MAX_QUOTED] for table in tables if table not in parts)
+    if out:
+        notice = Notice(code="parts_left_out", message=f"left out, because other columns stand in it: {out}")
+        parts[0] = replace(parts[0], notices=[*parts[0].notices, notice])
+    return replace(parts[0], parts=tuple(parts))
+
+
+def _value(channel: str, choice: ColumnChoice, stated: Mapping[str, str]) -> float:
+    """A channel's value as the caller has it, or as it is stated beside the label that the caller names."""
     text, unit = choice.column[1:].strip(), choice.unit
     if not _NUMBER.fullmatch(text):
-        texts = {label.rstrip(":= ").casefold(): (label, cell) for label, cell in labels(table.above).items()}
+        texts = {label.rstrip(":= ").casefold(): (label, cell) for label, cell in stated.items()}
         texts |= {column_of(label).name.casefold(): held for label, held in list(texts.items())}
         if text.casefold() not in texts:
             shown = ", ".join(repr(label) for label, _ in [*dict.fromkeys(texts.values())][:10]) or "none"
@@ -82,9 +148,10 @@ def stacked_columns(table: Table, reading: Reading) -> Table:
     channel = next((name for name, choice in reading.mapping.items() if choice.column == COLUMNS), None)
     if channel is None:
         return table
-    stated = [value_within(column.name, channel) for column in table.columns]
+    unit = reading.mapping[channel].unit
+    stated = [value_of_column(column, channel, unit) if column.title else None for column in table.columns]
     values = sorted({held[0] for held in stated if held})
-    shared = [at for at, held in enumerate(stated) if held is None]
+    shared = [at for at, held in enumerate(stated) if held is None and table.columns[at].title]
     of_each = [[at for at, held in enumerate(stated) if held and held[0] == value] for value in values]
     names = [[(stated[at] or (0, ""))[1] for at in places] for places in of_each]
     if not values or any(own != names[0] for own in names):
@@ -92,50 +159,67 @@ def stacked_columns(table: Table, reading: Reading) -> Table:
             f"map gives {channel} the values in the titles of columns, which must name the same columns for each value"
         )
         raise InvalidError.of(message, code="invalid_map", pointer="/map", value=COLUMNS)
-    columns = [table.columns[at] for at in shared]
-    columns += [replace(table.columns[at], name=name) for at, name in zip(of_each[0], names[0], strict=True)]
+    columns = [replace(table.columns[at], clock=None, rows=None) for at in shared]
+    for at, name in zip(of_each[0], names[0], strict=True):
+        column = replace(table.columns[at], name=name, group="", clock=None, rows=None)
+        columns.append(column if name != CELLS else FileColumn(CELLS, title=CELLS))
+    unit, width = CHANNELS[channel].unit, len(columns)
 
-    def read(taken: Mapping[int, str]) -> list[list[NDArray[Any]]]:
+    def read(taken: Mapping[int, str]) -> list[NDArray[Any]]:
+        held = {index: name for index, name in taken.items() if index < width} or {0: ""}
         places = [[*shared, *own] for own in of_each]
-        wanted = {own[index]: channel for own in places for index, channel in taken.items()}
-        held = dict(zip(wanted, table.read(wanted), strict=True))
-        return [[held[own[index]] for index in taken] for own in places]
+        wanted = {own[index]: name for own in places for index, name in held.items()}
+        cells = dict(zip(wanted, table.read(wanted), strict=True))
+        parts = [_without_empty_end({index: cells[own[index]] for index in held}, len(shared)) for own in places]
+        sizes = [len(next(iter(part.values()))) for part in parts]
+        joined = {index: _concatenated([part[index] for part in parts]) for index in held}
+        return [np.repeat(values, sizes) if index == width else joined[index] for index in taken]
 
     head = [
         [*(row[at] for at in [*shared, *of_each[0]]), f"{values[0]:g}"] for row in table.head if len(row) == len(stated)
     ]
-    first = replace(table, columns=tuple(columns), head=tuple(map(tuple, head)))
-    return one_below_the_other(first, channel, values, read, COLUMNS)
-
-
-def one_below_the_other(
-    first: Table, channel: str, values: Sequence[float], read_parts: _ReadParts, title: str
-) -> Table:
-    """The parts of one table, of which `first` is the first, as one, with a column of `title` for their `values`."""
-    width, sizes = len(first.columns), list[int]()
-    unit = CHANNELS[channel].unit
-
-    def read(taken: Mapping[int, str]) -> list[NDArray[Any]]:
-        held = {index: name for index, name in taken.items() if index < width} or {0: ""}
-        parts = read_parts(held)
-        sizes[:] = [len(part[0]) for part in parts]
-        joined = {}
-        for place, index in enumerate(held):
-            pieces = [part[place] for part in parts]
-            masked = any(isinstance(piece, np.ma.MaskedArray) for piece in pieces)
-            joined[index] = (np.ma.concatenate if masked else np.concatenate)(pieces)
-        return [np.repeat(values, sizes) if index == width else joined[index] for index in taken]
-
     listed = ", ".join(f"{value:g}" for value in values)
-    message = f"{channel} is {listed} {unit} by the {title[1:]}: their rows were read one below the other"
+    message = f"{channel} is {listed} {unit} by the columns: their rows were read one below the other"
     return replace(
-        first,
-        columns=(
-            *(replace(column, clock=None, rows=None) for column in first.columns),
-            FileColumn(title, unit, title=title),
-        ),
+        table,
+        columns=(*columns, FileColumn(COLUMNS, unit, title=COLUMNS)),
         read=read,
+        head=tuple(map(tuple, head)),
         line_of=None,
         breaks=(),
-        notices=[*first.notices, Notice(code="stacked", message=message)],
+        notices=[*table.notices, Notice(code="stacked", message=message)],
     )
+
+
+def value_of_column(column: FileColumn, channel: str, unit: str | None = None) -> tuple[float, str] | None:
+    """The value of a channel that a column's title or its group states, or is in the caller's `unit`, and what the column
+    holds by the rest of its title; None where it states none."""
+    if held := value_within(column.name, channel):
+        return held[0], held[1] or CELLS
+    if held := value_within(column.group, channel):
+        return held[0], column.name
+    match = _NUMBER.fullmatch(column.name)
+    converted = conversion(channel, unit) if unit else None
+    if match is None or match["unit"] or converted is None:
+        return None
+    value = np.array([float(match["number"].replace(",", "."))])
+    converted.apply(value)
+    return float(value[0]), CELLS
+
+
+def _without_empty_end(part: dict[int, NDArray[Any]], shared: int) -> dict[int, NDArray[Any]]:
+    """Columns [n] by index without the rows at their end in which all but the `shared` ones are empty: a longer part stands
+    beside this one."""
+    own = [values for index, values in part.items() if index >= shared]
+    filled = [at for at, row in enumerate(zip(*own, strict=True)) if any(not _is_empty(cell) for cell in row)]
+    end = filled[-1] + 1 if filled else None
+    return {index: values[:end] for index, values in part.items()} if end else part
+
+
+def _is_empty(cell: Any) -> bool:
+    return cell is np.ma.masked or cell is None or cell == ""
+
+
+def _concatenated(pieces: Sequence[NDArray[Any]]) -> NDArray[Any]:
+    masked = any(isinstance(piece, np.ma.MaskedArray) for piece in pieces)
+    return np.asanyarray((np.ma.concatenate if masked else np.concatenate)(pieces))

@@ -86,7 +86,7 @@ _FOREIGN = {
     b"CDF\x01": "a NetCDF 3 file (`nccopy -k nc4` makes HDF5 of it, `ncdump` text)",
     b"CDF\x02": "a NetCDF 3 file (`nccopy -k nc4` makes HDF5 of it, `ncdump` text)",
     b"CDF\x05": "a NetCDF 3 file (`nccopy -k nc4` makes HDF5 of it, `ncdump` text)",
-    b"<h": "an AiM file (RaceStudio exports CSV files)",
+    b"<hCNF": "an AiM file (RaceStudio exports CSV files)",
     b"LOGG": "a Vector BLF log (CANoe and CANape convert it with its database to MDF4 or CSV)",
     b"RIFF": "a RIFF file, as sound is kept in (save the channels as CSV or MATLAB file)",
     b":WFM#": "a Tektronix waveform (the oscilloscope saves CSV files too)",
@@ -96,7 +96,7 @@ _FOREIGN = {
     b"{": "JSON: send it to POST /v1/clutches/ID/runs",
 }
 #: Beginnings that a text may have too.
-_AMBIGUOUS = {b"BM", b"<h", b"LOGG", b"RIFF"}
+_AMBIGUOUS = {b"BM", b"LOGG", b"RIFF"}
 #: Suffixes of what is never a record; files in an archive are often accompanied by such.
 _NO_RECORDS = (
     ".pdf", ".png", ".jpg", ".jpeg", ".docx", ".doc", ".md", ".html", ".xml", ".json", ".zip", ".exe", ".py", ".m",

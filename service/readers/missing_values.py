@@ -5,7 +5,7 @@ led to it. One that begins with n nines (999, -9999, -999.25), or is the end of 
 10^n values, and lies far that much sooner. It may still be a measurement: it is refused, and `missing` settles which it is.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any
@@ -17,7 +17,7 @@ from models.arrays import FloatArray
 from service.channels import LineOf, place
 from service.errors import InvalidError, Notice
 from service.readers.numerals import NUMBER, plain
-from service.readers.table import NO_MISSING, Reading, Table, marks
+from service.readers.table import NO_MISSING, Reading, Table, fills_down, marks
 
 #: A value that is so many times as large as all others stands for none, a common one (more than a tenth of the rows) only
 #: farther off. Chosen: between neighbours of a test's values lie ten (speeds 1, 10, 100), and from an idle valve's 0.02 to
@@ -33,7 +33,9 @@ _JUMP, _CLOSE = 20.0, 0.1
 _ENDS = {2**bits - end for bits in (15, 16, 31, 32) for end in (0, 1)}
 #: Values at either end of a column that may each stand for none, rows at a table's end that may each be made of those above,
 #: and rows of a table beyond which nobody writes such ones. Chosen.
-_MAX_KINDS, _MAX_TOTALS, _LONGEST = 3, 6, 100_000
+_MAX_KINDS, _MAX_TOTALS, _LONGEST = 3, 8, 100_000
+#: Rows of a level that may have a mean below it. Chosen: fewer are one by chance too often.
+_SHORTEST_LEVEL = 5
 #: Rows by which the decimals of a column are counted. Chosen: of so many, not all end in zeros by chance.
 _MAX_LOOKED_AT = 50
 #: Values by which the usual size of a column is found. Chosen: their median is known to some percent; ten times is asked.
@@ -43,6 +45,11 @@ _MAX_SAMPLED = 1000
 #: plateaus' means has 1e-5, one of their maxima 0.04; of 4,800 pieces of real records one was left out wrongly.
 _BY_CHANCE, _BY_CHANCE_OWN = 0.002, 0.05
 _OWN = {"maxima", "minima", "medians"}
+#: Rows of a torque of zero, and of a higher pressure, that are asked about; less than this share of the largest speed and
+#: pressure there may be none; and times as high as a pressure in another unit is (psi: 14.5). Chosen.
+_MIN_ZEROS, _OF_LARGEST, _OTHER_UNIT = 3, 0.05, 12.0
+#: Those that stand only beside others.
+_BESIDE = {"numbers", "scatters"}
 #: Those that are not rounded.
 _EXACT = {"maxima", "minima", "ranges"}
 _STATISTICS: dict[str, Callable[[FloatArray], float]] = {
@@ -54,17 +61,74 @@ _STATISTICS: dict[str, Callable[[FloatArray], float]] = {
     "standard deviations": lambda column: float(column.std(ddof=1)),
     "standard deviations of all": lambda column: float(column.std()),
     "ranges": lambda column: float(np.ptp(column)),
+    "numbers": lambda column: float(column.size),
+    "scatters": lambda column: float(100 * column.std(ddof=1) / column.mean()) if column.mean() else 0.0,
 }
 
 
-def mask_stated_marks(values: NDArray[Any], reading: Reading) -> NDArray[Any]:
-    """Numbers [n], masked where they are one of the caller's marks, or NaN where there is any mark."""
-    stated = marks(reading.missing)
+def mask_stated_marks(values: NDArray[Any], reading: Reading, channel: str) -> NDArray[Any]:
+    """Numbers [n], masked where they are one of the caller's marks, or NaN where there is any mark; where it is ABOVE, those
+    without a value have the one above them."""
+    if fills_down(reading.missing) and channel != "time_s":
+        values = _filled_down(values)
+    stated = marks(reading.missing, channel)
     if not stated or values.dtype.kind not in "iuf":
         return values
     numbers = [float(mark) for mark in stated if NUMBER.fullmatch(mark)]
     missing = np.isin(values, numbers) | np.isnan(values) | np.ma.getmaskarray(values)
     return np.ma.MaskedArray(np.where(missing, np.nan, values), mask=missing)
+
+
+def _filled_down(values: NDArray[Any]) -> NDArray[Any]:
+    """Values [n], each masked one as the last one above it that is not."""
+    gaps = np.ma.getmaskarray(values)
+    last = np.maximum.accumulate(np.where(gaps, 0, np.arange(gaps.size)))
+    return np.ma.MaskedArray(np.ma.getdata(values)[last], mask=gaps[last])
+
+
+def refuse_no_torque(columns: Mapping[str, FloatArray], line_of: LineOf | None, reading: Reading) -> None:
+    """Raise InvalidError where the torque is exactly zero in several rows that follow each other, at a pressure and a speed:
+    friction has a torque there, and a sensor its noise."""
+    needed = [columns.get(name) for name in ("pressure_bar", "speed_rpm", "torque_nm")]
+    pressure, speed, torque = needed
+    if reading.missing == NO_MISSING or pressure is None or speed is None or torque is None or not torque.any():
+        return
+    slips = (np.abs(speed) > _OF_LARGEST * np.abs(speed).max()) & (pressure > _OF_LARGEST * pressure.max())
+    zero = np.concatenate([[0], (slips & (torque == 0)).view(np.int8), [0]])
+    starts, ends = np.flatnonzero(np.diff(zero) == 1), np.flatnonzero(np.diff(zero) == -1)
+    longest = int((ends - starts).argmax()) if starts.size else 0
+    if not starts.size or ends[longest] - starts[longest] < _MIN_ZEROS:
+        return
+    row, count = int(starts[longest]), int(ends[longest] - starts[longest])
+    stated = [mark.strip() for mark in reading.missing.split(",") if mark.strip()]
+    missing = ",".join([*stated, "torque_nm:0"])
+    message = (
+        f"{place('torque_nm', row, line_of)} is exactly 0, as in the {count - 1} rows after it, at {speed[row]:.6g} rpm and "
+        f"{pressure[row]:.6g} bar: was the sensor off? To leave these rows out, add missing={missing}; to use them, add "
+        f"missing={NO_MISSING}"
+    )
+    raise InvalidError.of(message, code="no_value", pointer=f"/channels/torque_nm/{row}", row=row + 1, value="0")
+
+
+def refuse_other_unit(columns: Mapping[str, FloatArray], line_of: LineOf | None, reading: Reading) -> None:
+    """Raise InvalidError where in some rows the pressure is many times as high as in the others and the torque is not: they
+    are in another unit."""
+    pressure, torque = columns.get("pressure_bar"), columns.get("torque_nm")
+    if reading.missing == NO_MISSING or pressure is None or torque is None or pressure.size < 2 * _MIN_ZEROS:
+        return
+    usual = np.median(np.abs(torque)) / max(float(np.median(np.abs(pressure))), 1e-9)
+    ratio = np.abs(torque) / np.maximum(np.abs(pressure), 1e-9)
+    high = (np.abs(pressure) > _OTHER_UNIT * np.median(np.abs(pressure))) & (ratio < usual / _OTHER_UNIT)
+    if np.count_nonzero(high) < _MIN_ZEROS or not usual:
+        return
+    row = int(high.argmax())
+    count = np.count_nonzero(high)
+    message = (
+        f"{place('pressure_bar', row, line_of)} is {pressure[row]:.6g} bar, as high in {count} of {high.size} "
+        "rows, and the torque is no higher than in the others: are these rows in another unit? Write them in one; to use "
+        f"them as they are, add missing={NO_MISSING}"
+    )
+    raise InvalidError.of(message, code="mixed_units", pointer=f"/channels/pressure_bar/{row}", row=row + 1)
 
 
 def refuse_stand_ins(name: str, values: NDArray[Any], line_of: LineOf | None, reading: Reading) -> None:
@@ -161,12 +225,12 @@ def drop_totals(
     numeric = all(column.dtype.kind in "iuf" for column in measured_columns)
     if len(sizes) != 1 or max(sizes) > _LONGEST or not numeric:
         return dict(columns), table
-    starts = [0, *table.breaks, *sizes]
+    blocks = [*pairwise([0, *table.breaks, *sizes])]
     keep = np.ones(max(sizes), dtype=np.bool_)
     notices = []
-    for start, end in pairwise(starts):
+    for start, end in [*blocks, *_levels(measured_columns)]:
         made_of = _totals([plain(column[start:end]) for column in measured_columns])
-        if made_of:
+        if made_of and keep[end - len(made_of) : end].all():
             keep[end - len(made_of) : end] = False
             line = end - len(made_of)
             where = f"line {table.line_of(line)}" if table.line_of else f"row {line + 1}"
@@ -185,6 +249,16 @@ def drop_totals(
     return {index: column[keep] if column.size == keep.size else column for index, column in columns.items()}, table
 
 
+def _levels(columns: Sequence[NDArray[Any]]) -> list[tuple[int, int]]:
+    """Where the rows begin and end in which a column stays as it is: levels of a test, which may have a mean each."""
+    found = []
+    for column in columns:
+        ends = [0, *(np.flatnonzero(np.diff(plain(column)) != 0) + 1), column.size]
+        if 1 < len(ends) - 1 <= column.size / _SHORTEST_LEVEL:
+            found += [(start, end) for start, end in pairwise(map(int, ends)) if end - start >= _SHORTEST_LEVEL]
+    return found
+
+
 def _totals(columns: list[FloatArray]) -> list[str]:
     """What the last rows of columns [n] are made of, a word for each; empty where they may be measured."""
     for count in range(min(_MAX_TOTALS, columns[0].size - 3), 0, -1):
@@ -200,7 +274,7 @@ def _totals(columns: list[FloatArray]) -> list[str]:
             made_of.append(name)
             by_chance *= 1.0 if repeated else chance
         limit = _BY_CHANCE_OWN if set(made_of) <= _OWN else _BY_CHANCE
-        if len(set(made_of)) == count and by_chance < limit:
+        if len(set(made_of)) == count and by_chance < limit and not set(made_of) <= _BESIDE:
             return made_of
     return []
 

@@ -5,7 +5,7 @@ from typing import Any
 
 from service.errors import MAX_QUOTED, InvalidError
 from service.readers.column_names import choices_of, column_of, understood
-from service.readers.constants import constants, stacked_columns
+from service.readers.constants import constants, stacked_columns, with_constants
 from service.readers.long_table import widened
 from service.readers.table import Reading, Table, labels
 
@@ -21,7 +21,7 @@ def preview(table: Table, reading: Reading) -> dict[str, Any]:
     cannot be read so.
     """
     try:
-        table, reading = widened(stacked_columns(table, reading), reading)
+        table, reading = widened(stacked_columns(with_constants(table, reading), reading), reading)
         constants(table, reading)
         chosen, errors = understood(table.columns, reading)
     except InvalidError as error:

@@ -4,24 +4,29 @@
 are read by the same two steps in a process of their own (`sandbox`).
 """
 
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import Any
 
+from service.channels import CHANNELS
 from service.errors import InvalidError
 from service.readers import sandbox
-from service.readers.assemble import Channels, to_channels
+from service.readers.assemble import Channels, below_each_other, to_channels
 from service.readers.column_names import parse_map
+from service.readers.constants import value_of_part
 from service.readers.detect import Format, members, opened, sniff, unpacked
 from service.readers.limits import LIMITS, Limits
 from service.readers.preview import preview
 from service.readers.suggest import Proposal, propose
-from service.readers.table import Reading, index_of_wanted
+from service.readers.table import ALL, SHEETS, ColumnChoice, Reading, index_of_wanted
 from service.readers.text import read_text
 
 #: Files of an archive that are tried, to find the one that holds channels. Chosen; a rig's folder of one test has few.
 _MAX_TRIED = 10
+#: The confidence that files of one archive are parts of one test. Chosen.
+_ALL = 0.8
 
 
 def reading_of(mapping: str | None = None, **others: Any) -> Reading:
@@ -69,13 +74,18 @@ def _read(path: Path, filename: str, reading: Reading, limits: Limits, answer: s
 def _in_archive(path: Path, reading: Reading, limits: Limits, answer: sandbox.Answer) -> Any:
     """What the one record in an archive holds; of several the one that `reading` names, as `file` or `file/table`."""
 
-    def read(name: str, table: str) -> Any:
+    def read_by(name: str, asked: Reading) -> Any:
         with unpacked(path, name, limits) as plain:
             if sniff(plain, name, limits) is Format.ZIP:
                 raise InvalidError(f"{name!r} is an archive inside the archive: unpack it and send its file")
-            return _read(plain, name, replace(reading, table=table), limits, answer)
+            return _read(plain, name, asked, limits, answer)
+
+    def read(name: str, table: str) -> Any:
+        return read_by(name, replace(reading, table=table))
 
     names = members(path, limits)
+    if reading.reads_all() and answer != "suggestion":
+        return _all_of_archive(names, read_by, reading, answer)
     matching = [name for name in names if reading.table in (name, Path(name).name)]
     within = [name for name in names if reading.table.startswith(f"{name}/")]
     if len(matching) == 1:
@@ -92,6 +102,37 @@ def _in_archive(path: Path, reading: Reading, limits: Limits, answer: sandbox.An
             refused.append(error)
     if not records and len(refused) == 1:
         raise refused[0]
-    if not records and answer == "suggestion":
-        return None
+    if answer == "suggestion" and len(records) != 1:
+        return _for_all(list(records.values()))
     return list(records.values())[index_of_wanted(list(records) or names, "", "file")]
+
+
+def _all_of_archive(names: Sequence[str], read: Callable[[str, Reading], Any], reading: Reading, answer: str) -> Any:
+    """The channels of all files of an archive, one below the other; the preview is that of the first."""
+
+    def asked(name: str) -> Reading:
+        stated = {channel: _by_name(name, channel, choice) for channel, choice in reading.mapping.items()}
+        return replace(reading, table="", mapping=stated)
+
+    if answer == "preview":
+        return read(names[0], asked(names[0]))
+    return below_each_other([read(name, asked(name)) for name in names])
+
+
+def _by_name(name: str, channel: str, choice: ColumnChoice) -> ColumnChoice:
+    """A choice with the value that a file's name states in place of `=sheets`."""
+    value = value_of_part(PurePath(name).stem, (), channel) if choice.column == SHEETS else None
+    return choice if value is None else replace(choice, column=f"={value:g}", unit=CHANNELS[channel].unit)
+
+
+def _for_all(proposals: Sequence[Proposal]) -> Proposal | None:
+    """How all files of an archive may be read that are read alike but for a constant pressure; None where they are not."""
+    readings = []
+    for proposal in proposals:
+        mapping = dict(proposal.reading.mapping)
+        if "pressure_bar" in mapping and mapping["pressure_bar"].is_constant():
+            mapping["pressure_bar"] = ColumnChoice(column=SHEETS)
+        readings.append(replace(proposal.reading, mapping=mapping, table=ALL))
+    if not readings or any(reading != readings[0] for reading in readings):
+        return None
+    return replace(proposals[0], reading=readings[0], confidence=min(_ALL, *(own.confidence for own in proposals)))

@@ -5,7 +5,7 @@ the file can be read so. Nothing here is ever used to read a file that nobody ha
 """
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import PurePath
 
@@ -15,13 +15,20 @@ from models.arrays import FloatArray
 from service.channels import CHANNELS
 from service.errors import FieldError, InvalidError
 from service.readers.assemble import as_seconds, runs_on, to_channels
-from service.readers.column_names import choices_of, like_a_time
-from service.readers.constants import stacked_columns, value_within
-from service.readers.limits import Limits
+from service.readers.column_names import choices_of, column_of, like_a_time
+from service.readers.constants import (
+    stacked_columns,
+    value_of_column,
+    value_of_part,
+    value_within,
+    with_constants,
+)
+from service.readers.limits import LONGEST_TITLE, Limits
 from service.readers.long_table import widened
 from service.readers.meanings import MEANS, SYMBOLS, Sense, has_noun, is_another, is_short_for, meaning, measures, words
-from service.readers.numerals import is_stamp, plain, read_cells
-from service.readers.table import COLUMNS, NO_TIME, SHEETS, ColumnChoice, FileColumn, Reading, Table, labels, marks
+from service.readers.numerals import is_stamp, plain, read_cells, with_unit_apart
+from service.readers.table import ALL, CELLS, COLUMNS, NO_TIME, SHEETS, ColumnChoice, FileColumn, Reading, Table, labels
+from service.readers.table_finder import CORNER, is_value
 from service.readers.unit_table import conversion, is_unit
 
 #: The channels that every test needs.
@@ -47,6 +54,9 @@ _MS_STEPS, _MANY_ROWS = 2.0, 500
 #: Things that are mended one after the other.
 _MAX_STEPS = 6
 _MARK_NAMED = re.compile(r"missing=(\S+?)(?:;| to )")
+#: Rivals that differ by less than this share of the largest value hold the same; a pressure that the torque goes by; and a
+#: level of pressure that is that of another part. Chosen.
+_SAME, _FOLLOWS, _SAME_LEVEL = 0.01, 0.8, 0.1
 _UNIT_NAMED = re.compile(r"may be (\S+): state it with map=(\w+):")
 
 
@@ -64,14 +74,33 @@ def propose(
 ) -> Proposal | None:
     """The reading by which the file gives the channels of a test; None where none is found. `read_table` reads its table.
 
-    Raises TooLargeError as reading does.
+    A file of several parts alike is read as all of them. Raises TooLargeError as reading does.
     """
+    whole = replace(reading, table=ALL)
+    if not reading.table and _has_parts(read_table, whole):
+        found = _attempt(read_table, whole, limits, filename)
+        if found is not None:
+            return found
+    return _attempt(read_table, reading, limits, filename)
+
+
+def _has_parts(read_table: Callable[[Reading], Table], whole: Reading) -> bool:
+    try:
+        return len(read_table(whole).parts) > 1
+    except InvalidError:
+        return False
+
+
+def _attempt(
+    read_table: Callable[[Reading], Table], reading: Reading, limits: Limits, filename: str
+) -> Proposal | None:
+    """The reading, with what is wrong with it mended one thing after the other."""
     confidence, asked, clock = 1.0, reading, False
     for _ in range(_MAX_STEPS):
         try:
             table = read_table(asked)
             named, sure = _named(table, asked, filename, clock=clock)
-            found = to_channels(table, named, limits).columns.keys() >= {*_NEEDED}
+            columns = to_channels(table, named, limits).columns
         except InvalidError as error:
             wrong = error.errors[0] if error.errors else None
             if wrong is not None and wrong.code == "ambiguous" and wrong.pointer == "/time" and not clock:
@@ -82,15 +111,27 @@ def propose(
                 return None
             asked, confidence = mended[0], min(confidence, mended[1])
         else:
-            certain = round(min(confidence, sure), 2)
-            return Proposal(reading=named, confidence=certain, titles=_titles(table, named)) if found else None
+            if not columns.keys() >= {*_NEEDED} or (asked.table == ALL and _comes_back(columns["pressure_bar"])):
+                return None
+            confidence = min(confidence, sure, _CONSTANT if asked.table == ALL else 1.0)
+            return Proposal(reading=named, confidence=round(confidence, 2), titles=_titles(table, named))
     return None
+
+
+def _comes_back(pressure: FloatArray) -> bool:
+    """Whether a level of pressure [n] comes back after another one: parts with the same levels are tests of their own."""
+    levels: list[float] = []
+    for value in pressure.tolist():
+        if not levels or abs(value - levels[-1]) > _SAME_LEVEL * max(abs(levels[-1]), 1.0):
+            levels.append(value)
+    ordered = np.sort(levels)
+    return bool((np.diff(ordered) < _SAME_LEVEL * np.maximum(ordered[1:], 1.0)).any())
 
 
 def _titles(table: Table, reading: Reading) -> tuple[str, ...]:
     """All columns as a profile names them."""
-    wide, _ = widened(stacked_columns(table, reading), reading)
-    return tuple(_title(own) for own in wide.columns if own.name and not own.name.startswith("="))
+    wide, _ = widened(stacked_columns(with_constants(table, reading), reading), reading)
+    return tuple(dict.fromkeys(_title(own) for own in wide.columns if own.name and not own.name.startswith("=")))
 
 
 # --- columns ---
@@ -99,7 +140,9 @@ def _titles(table: Table, reading: Reading) -> tuple[str, ...]:
 def _named(table: Table, asked: Reading, filename: str, *, clock: bool) -> tuple[Reading, float]:
     """The reading with a column for each channel that has one, and the confidence of that; `clock`: one of several times
     too."""
-    stacked = stacked_columns(table, asked)
+    if (crossed := _crossed(table, asked)) is not None:
+        return crossed
+    stacked = stacked_columns(with_constants(table, asked), asked)
     wide, wide_reading = widened(stacked, asked)
     mapping, confidence = dict(asked.mapping), 1.0
     least = 1.0 if {*_NEEDED} <= mapping.keys() else 0.0  # a caller who named them all wants no other guess
@@ -109,16 +152,18 @@ def _named(table: Table, asked: Reading, filename: str, *, clock: bool) -> tuple
     }
     for channel in (*_NEEDED, *(name for name in CHANNELS if name not in (*_NEEDED, "time_s"))):
         scores = {at: _likelihood(own, channel) for at, own in free.items()} if channel not in mapping else {}
-        at, sure = _best({at: score for at, score in scores.items() if score > 0 and score >= least})
+        scores = {at: score for at, score in scores.items() if score > 0 and score >= least}
+        at, sure = _settled(wide, scores, channel, mapping, wide_reading) if channel in _NEEDED else _best(scores)
         if at is not None:
             mapping[channel], by_size = _choice(wide, at, channel, wide_reading)
             confidence = min(confidence, sure, by_size) if channel in _NEEDED else confidence
             del free[at]
-    if "pressure_bar" not in mapping and (constant := _constant(wide, filename)):
+    if "pressure_bar" not in mapping and (constant := _constant(table, filename, asked)):
         mapping["pressure_bar"] = ColumnChoice(column=constant)
         confidence = min(confidence, _CONSTANT)
         if constant == COLUMNS:
-            return _named(table, replace(asked, mapping=_only(asked, constant)), filename, clock=clock)
+            named, sure = _named(table, replace(asked, mapping=_only(asked, constant)), filename, clock=clock)
+            return named, min(sure, confidence)
     named = replace(asked, mapping=mapping)
     if wide is not stacked or asked.time or "time_s" in mapping:
         return named, confidence
@@ -131,6 +176,106 @@ def _named(table: Table, asked: Reading, filename: str, *, clock: bool) -> tuple
 
 def _only(asked: Reading, constant: str) -> dict[str, ColumnChoice]:
     return {**asked.mapping, "pressure_bar": ColumnChoice(column=constant)}
+
+
+def _crossed(table: Table, asked: Reading) -> tuple[Reading, float] | None:
+    """How a table is read whose titles are values, of pressure over a column of speeds or of speed over one of pressures,
+    and whose cells are torques; None where it is of another form."""
+    at_numbers = [
+        at for at, own in enumerate(table.columns) if at and with_unit_apart(own.title)[0] and is_value(own.title)
+    ]
+    if len(at_numbers) != len(table.columns) - 1 or len(at_numbers) < 2 or asked.mapping:
+        return None
+    down = table.columns[0]
+    texts = [part for row in (table.heads or [()])[0] for cell in row for part in CORNER.split(cell)]
+    likely = {
+        channel: max(_likelihood(down, channel), _UNIT_ALONE * measures(channel, down.unit))
+        for channel in ("speed_rpm", "pressure_bar")
+    }
+    if not max(likely.values()):
+        return None
+    under, across = sorted(likely, key=lambda channel: likely[channel], reverse=True)
+    in_titles = column_of(table.columns[1].title).unit or with_unit_apart(table.columns[1].title)[1]
+    stated = in_titles or _unit_among(texts, across)
+    mapping = {
+        under: ColumnChoice(column=_title(down), unit=None if down.unit else _unit_among(texts, under)),
+        across: ColumnChoice(column=COLUMNS, unit=None if in_titles else stated),
+        "torque_nm": ColumnChoice(column=CELLS, unit=_unit_among(texts, "torque_nm")),
+    }
+    sure = stated and mapping["torque_nm"].unit and (down.unit or mapping[under].unit)
+    if not stated:
+        mapping[across] = replace(mapping[across], unit=CHANNELS[across].unit)
+    return replace(asked, mapping=mapping), _CONSTANT if sure else _UNIT_BY_SIZE
+
+
+def _unit_among(texts: Sequence[str], channel: str) -> str | None:
+    """The first unit of a channel that stands in one of the texts, in brackets or at their end."""
+    return next(
+        (unit for text in texts if (unit := column_of(text[:LONGEST_TITLE]).unit) and measures(channel, unit)), None
+    )
+
+
+def _settled(
+    table: Table, scores: Mapping[int, float], channel: str, mapping: Mapping[str, ColumnChoice], reading: Reading
+) -> tuple[int | None, float]:
+    """The likeliest column, and its confidence. Of rivals all must hold the same values, in whatever units; a pressure may
+    be the one by which the torque goes. None where only a person knows which."""
+    best = max(scores.values(), default=0.0)
+    rivals = [at for at, score in scores.items() if score >= _RIVAL * best]
+    rivals = [at for at in rivals if table.columns[at].unit is not None] or rivals
+    if len(rivals) < 2:
+        return (rivals[0], best) if rivals else (None, 1.0)
+    own = {at: _converted(table, at, channel, reading) for at in rivals}
+    first, *others = own.values()
+    scale = float(np.nanmax(np.abs(first), initial=0.0))
+    if all(np.allclose(first, other, rtol=0, atol=_SAME * scale, equal_nan=True) for other in others):
+        return next((at for at in rivals if table.columns[at].unit == CHANNELS[channel].unit), rivals[0]), best
+    torque = next(
+        (
+            at
+            for at, column in enumerate(table.columns)
+            if mapping.get("torque_nm") and _address(table, at) == mapping["torque_nm"].column
+        ),
+        None,
+    )
+    if channel != "pressure_bar" or torque is None:
+        return None, 1.0
+    torques = np.abs(_converted(table, torque, "torque_nm", reading))
+    follows = {at: _correlation(values, torques) for at, values in own.items()}
+    chosen, *rest = sorted(follows, key=lambda at: follows[at], reverse=True)
+    clear = follows[chosen] > _FOLLOWS and all(follows[at] < _FOLLOWS - 0.3 for at in rest)
+    return (chosen, _WITH_RIVAL * best) if clear else (None, 1.0)
+
+
+def _converted(table: Table, at: int, channel: str, reading: Reading) -> FloatArray:
+    """A column's values [n] in the channel's unit, as far as it states one."""
+    values = plain(read_cells(table, {at: channel}, reading)[at])
+    converted = conversion(channel, table.columns[at].unit or "")
+    if converted is not None:
+        converted.apply(values)
+    return values
+
+
+def _correlation(values: FloatArray, others: FloatArray) -> float:
+    both = np.isfinite(values) & np.isfinite(others) if values.size == others.size else np.zeros(0, dtype=bool)
+    if np.count_nonzero(both) < 3 or not np.ptp(values[both]) or not np.ptp(others[both]):
+        return 0.0
+    return float(np.corrcoef(values[both], others[both])[0, 1])
+
+
+def _address(table: Table, at: int) -> str:
+    """A column's name as a map has it: with its unit, or its number, where others have the same."""
+    column = table.columns[at]
+    name, titles = _title(column), [own.title for own in table.columns]
+    equal = [other for other, own in enumerate(table.columns) if _title(own) == name]
+    if len(equal) == 1:
+        return name
+    if column.title != name and titles.count(column.title) == 1:
+        return column.title
+    units = [table.columns[other].unit for other in equal]
+    return (
+        f"{name} [{column.unit}]" if column.unit and units.count(column.unit) == 1 else f"{name}#{equal.index(at) + 1}"
+    )
 
 
 def _title(column: FileColumn) -> str:
@@ -182,8 +327,7 @@ def _best(scores: Mapping[int, float]) -> tuple[int | None, float]:
 
 def _choice(table: Table, at: int, channel: str, reading: Reading) -> tuple[ColumnChoice, float]:
     """A column with its unit, the one that its values suggest where it states none; and the confidence of that."""
-    column = table.columns[at]
-    title = _title(column)
+    column, title = table.columns[at], _address(table, at)
     if column.unit is not None or column.name == channel:
         return ColumnChoice(column=title), 1.0
     if channel == "time_s" and any(is_stamp(row[at]) for row in table.head[:1] if len(row) > at):
@@ -228,12 +372,15 @@ def _time(table: Table, free: Mapping[int, FileColumn], reading: Reading, *, nee
     return _best(scores)
 
 
-def _constant(table: Table, filename: str) -> str | None:
-    """Where a pressure stands that no column holds: in the titles of columns, above the table, or in the file's name."""
-    within = [value_within(column.name, "pressure_bar") for column in table.columns]
+def _constant(table: Table, filename: str, asked: Reading) -> str | None:
+    """Where a pressure stands that no column holds: in the titles of columns, in the names of the file's parts or above
+    them, or in the file's name."""
+    within = [value_of_column(column, "pressure_bar") for column in table.columns]
     if len({held[0] for held in within if held}) > 1:
         return COLUMNS
-    for label, text in labels(table.above).items():
+    if asked.reads_all() and value_of_part(table.name, (table.heads or [table.above])[0], "pressure_bar") is not None:
+        return SHEETS
+    for label, text in labels((table.heads or [table.above])[0]).items():
         name = label.rstrip(":= ")
         of, sense = meaning(re.sub(r"[\[(].*", "", name).strip())
         if of == "pressure_bar" and sense in _SURE and re.match(r"[+-]?\d+(?:[.,]\d+)?\s*\S{0,6}$", text):
@@ -270,37 +417,37 @@ def _mended(
         choice = replace(asked.mapping[unit[2]], unit=unit[1])
         return replace(asked, mapping={**asked.mapping, unit[2]: choice}), _UNIT_BY_SIZE
     if mark := _MARK_NAMED.search(detail):
-        stated = [*marks(asked.missing), *(one for one in marks(mark[1]) if one not in marks(asked.missing))]
+        stated = dict.fromkeys(filter(None, [*asked.missing.split(","), *mark[1].split(",")]))
         return replace(asked, missing=",".join(stated)), _MARK
     return None
 
 
 def _table_chosen(first: str, asked: Reading, read_table: Callable[[Reading], Table]) -> tuple[Reading, float]:
-    """All sheets, where their names state pressures; else the first table."""
-    sheets = replace(asked, mapping=_only(asked, SHEETS))
-    try:
-        read_table(sheets)
-    except InvalidError:
-        return replace(asked, table=first), _FIRST_OF_SEVERAL
-    return sheets, _CONSTANT
+    """All parts, if they are alike; else the first table."""
+    whole = replace(asked, table=ALL)
+    parts = read_table(whole).parts
+    return (
+        (replace(asked, table=first), _FIRST_OF_SEVERAL)
+        if len(parts) == 1 and len(read_table(whole).others) > 1
+        else (whole, _CONSTANT)
+    )
 
 
 def _sign_chosen(
     asked: Reading, read_table: Callable[[Reading], Table], limits: Limits, filename: str
 ) -> tuple[Reading, float] | None:
-    """The decimal sign by which values change least from row to row."""
+    """The reading with the decimal sign by which values change least from row to row, and with what else it asks for."""
     changes: dict[str, float] = {}
+    mended: dict[str, Proposal] = {}
     for sign in (",", "."):
-        signed = replace(asked, decimal=sign)
-        try:
-            table = read_table(signed)
-            columns = to_channels(table, _named(table, signed, filename, clock=False)[0], limits).columns
-        except InvalidError:
-            continue
-        changes[sign] = sum(_changes(columns.values()))
+        found = _attempt(read_table, replace(asked, decimal=sign), limits, filename)
+        if found is not None:
+            columns = to_channels(read_table(found.reading), found.reading, limits).columns
+            changes[sign], mended[sign] = sum(_changes(columns.values())), found
     if not changes:
         return None
-    return replace(asked, decimal=min(changes, key=lambda sign: changes[sign])), _SIGN
+    found = mended[min(changes, key=lambda sign: changes[sign])]
+    return found.reading, min(_SIGN, found.confidence)
 
 
 def _changes(columns: Iterable[FloatArray]) -> Iterator[float]:

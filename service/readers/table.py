@@ -13,13 +13,18 @@ from numpy.typing import NDArray
 from models.arrays import FloatArray
 from service.channels import LineOf
 from service.errors import MAX_QUOTED, InvalidError, Notice
+from service.readers.unit_table import is_unit
 
 #: The time option that takes no clock: each row is a plateau.
 NO_TIME = "none"
-#: The titles of a channel whose values stand in the titles of columns, or in the names of sheets.
-COLUMNS, SHEETS = "=columns", "=sheets"
-#: The option of missing values by which every number is a measurement.
-NO_MISSING = "none"
+#: The titles of a channel whose values stand in the titles of columns, or in the names of a file's parts (sheets, groups,
+#: archived files, lines above blocks), and of one whose values fill the cells under such titles.
+COLUMNS, SHEETS, CELLS = "=columns", "=sheets", "=cells"
+#: The table option by which all parts of a file are read, one below the other.
+ALL = "*"
+#: The option of missing values by which every number is a measurement; the mark by which an empty cell holds what stands
+#: above it, as merged cells do.
+NO_MISSING, ABOVE = "none", "above"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,7 +43,7 @@ class ColumnChoice:
 
     def is_constant(self) -> bool:
         """Whether it names no column but a value: `=5 bar`, or `=LABEL` of what stands above the table."""
-        return self.column.startswith("=") and self.column not in (COLUMNS, SHEETS)
+        return self.column.startswith("=") and self.column not in (COLUMNS, SHEETS, CELLS)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,9 +51,10 @@ class Reading:
     """How to read a file; empty where the file says it all. A rig profile keeps one.
 
     `mapping`: channel -> its column; `only_named`: no other column is taken. `left_out`: titles that are left out on
-    purpose. `table`: the sheet, group or archived file. `time`: the title of the time column, or NO_TIME. `decimal`: the
-    decimal sign, "." or ",". `skip_rows`: lines above that are not looked at. `missing`: marks of values that are missing,
-    such as `-9999,n/a`; where any is given, rows without a value are left out; NO_MISSING: every number is a measurement.
+    purpose. `table`: the sheet, group or archived file, or ALL. `time`: the title of the time column, or NO_TIME. `decimal`:
+    the decimal sign, "." or ",". `skip_rows`: lines above that are not looked at. `missing`: marks of values that are
+    missing, such as `-9999,n/a`, of one channel as `torque_nm:0`; where any is given, rows without a value are left out;
+    ABOVE: empty cells hold what stands above them; NO_MISSING: every number is a measurement.
     `good`: codes of a column of qualities that mark good rows, such as `0` or `192`; NO_MISSING: all rows are read.
     """
 
@@ -61,6 +67,10 @@ class Reading:
     skip_rows: int = 0
     missing: str = ""
     good: str = ""
+
+    def reads_all(self) -> bool:
+        """Whether all parts of a file are read, one below the other."""
+        return self.table == ALL or any(choice.column == SHEETS for choice in self.mapping.values())
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,8 +116,9 @@ Values = Callable[[Mapping[int, str]], Sequence[NDArray[Any]]]
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Table:
     """A table as read. `above`: the lines over it; `first_line`: where its data begin (None: the format has no lines);
-    `head`: its first rows as text. Of several tables below each other, with the same titles, `breaks` has the first row of
-    each but one. `line_of`, `breaks` and `notices` hold once the values are read."""
+    `head`: its first rows as text. Of several blocks below each other, with the same titles, `breaks` has the first row of
+    each but one, and `heads` the lines over each. `parts`: all tables of the file, of which this is the first, where it is
+    read by ALL. `line_of`, `breaks`, `heads` and `notices` hold once the values are read."""
 
     columns: tuple[FileColumn, ...]
     read: Values
@@ -118,21 +129,37 @@ class Table:
     head: tuple[tuple[str, ...], ...] = ()
     line_of: LineOf | None = None
     breaks: Sequence[int] = ()
+    heads: Sequence[Sequence[Sequence[str]]] = ()
     notices: Sequence[Notice] = ()
+    parts: "tuple[Table, ...]" = ()
 
 
-def marks(missing: str) -> list[str]:
-    """The marks in a list such as `-9999,n/a`, in small letters."""
-    return [] if missing == NO_MISSING else [mark.strip().casefold() for mark in missing.split(",") if mark.strip()]
+def marks(missing: str, channel: str = "") -> list[str]:
+    """The marks of all channels in a list such as `-9999,torque_nm:0`, and those of one `channel`, in small letters."""
+    if missing == NO_MISSING:
+        return []
+    stated = [mark.strip().casefold() for mark in missing.split(",") if mark.strip()]
+    return [
+        mark.removeprefix(f"{channel}:")
+        for mark in stated
+        if ":" not in mark or (channel and mark.startswith(f"{channel}:"))
+    ]
+
+
+def fills_down(missing: str) -> bool:
+    """Whether an empty cell holds what stands above it."""
+    return ABOVE in marks(missing)
 
 
 def labels(above: Sequence[Sequence[str]]) -> dict[str, str]:
-    """What the lines above a table say: `label: value`, `label = value` or a label and its value in two cells."""
+    """What the lines above a table say: `label: value`, `label = value` or a label, its value and its unit in cells."""
     values_by_label: dict[str, str] = {}
     for row in above:
         cells = [cell for cell in row if cell]
         if len(cells) == 1:
             cells = [part.strip() for part in re.split(r"[:=]", cells[0], maxsplit=1)]
+        elif len(cells) == 3 and is_unit(cells[2]):
+            cells = [cells[0], f"{cells[1]} {cells[2]}"]
         if len(cells) > 1 and cells[1]:
             values_by_label.setdefault(cells[0][:MAX_QUOTED], cells[1][:MAX_QUOTED])
     return values_by_label

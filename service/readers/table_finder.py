@@ -44,6 +44,13 @@ _SUMMARY = re.compile(
     r"max(?:im(?:um|a))?|min(?:im(?:um|a))?|sum(?:me)?|total|median|range|std(?:ev)?|stabw|standardabweichung|平均[値值]?|最[大小][値值]?|合[計计])\.?:?",
     re.IGNORECASE,
 )
+#: What stands between the two quantities of a table's corner (`n [1/min] \ p [bar]`).
+CORNER = re.compile(r"\s*[\\|↓→]\s*|\s+/\s+")
+#: The same below such a row.
+_BELOW_SUMMARY = re.compile(
+    r"[#]? ?(?:n|no|cnt|count|number|anzahl|points|s|sd|sigma|σ|cv|rms|var|varian[cz]e?|q\d*|p\d+).{0,12}",
+    re.IGNORECASE,
+)
 #: What a row begins with that holds a factor for each column.
 _FACTORS = re.compile(r"\w*[ _]?(?:fa[ck]tor|gain|s[ck]al|slope|mult)", re.IGNORECASE)
 NUMERIC = re.compile(
@@ -82,48 +89,100 @@ class Layout:
 
 
 class DataRows:
-    """Which rows under a table's titles are its data: none that is blank, is one of those above again, or a footer."""
+    """Which rows under a table's titles are its data: none that is blank, is one of those above again, or a footer.
+
+    Titles that stand again, and lines of words with a number in them (`4 bar`), begin a further block of the table.
+    """
 
     def __init__(self, rows: Sequence[Row], layout: Layout) -> None:
         self.rows, self.layout, above = rows, layout, rows[: layout.start]
         self.titles, self.first_row = rows[layout.titles], rows[layout.start] if layout.start < len(rows) else []
+        self._over = [shown(row) for row in above[-MAX_ROWS:]]
+        self._labelled = above[-layout.labelled :] if layout.labelled else []
         self._above = {tuple(row) for row in above if not all(map(is_value, row))}
-        #: The first row of data of each further table under the same titles.
-        self.breaks: list[int] = []
-        self.notices: list[Notice] = []
-        self._summaries: list[Row] = []
         self._summarised = _is_summary(self.first_row)
-        if layout.labelled:
-            self._leave_out(above[-layout.labelled :], "above the first row of")
+        #: The first row of data of each further block; the lines over each block; what is to be said.
+        self.breaks: list[int] = []
+        self.heads: list[Sequence[Sequence[str]]] = []
+        self.notices: list[Notice] = []
+        self.begin()
+
+    def begin(self) -> None:
+        """Begin with the first row: the rows may be read several times."""
+        self.breaks.clear()
+        self.heads[:] = [self._over]
+        self.notices.clear()
+        self._summaries: list[Row] = []
+        self._after_summary = False
+        #: Lines of words that may be a footer or begin a block, and whether the titles stood again among them.
+        self._words: list[tuple[int, Row]] = []
+        self._titles_again = False
+        if self._labelled:
+            self._leave_out(self._labelled, "above the first row of")
 
     def of(self, rows: Iterable[tuple[int, Row]], before: int, *, last: bool) -> tuple[list[int], list[Any]]:
-        """Numbers and cells of those of the next rows that are data; `before` were found already, `last`: none follow."""
+        """Numbers and cells of those of the next rows that are data; `before` were found already, `last`: none follow.
+
+        Raises InvalidError on a row of other titles or other units.
+        """
         data_rows: list[tuple[int, Row]] = []
         for number, row in rows:
-            if row == self.titles and before + len(data_rows):
-                self._split_footer(data_rows)
-                self.breaks.append(before + len(data_rows))
-            elif not is_blank(row) and tuple(row) not in self._above:
-                summary = not self._summarised and _is_summary(row) and any(map(is_value, row))
-                self._summaries += [row] if summary else []
-                data_rows += [] if summary else [(number, row)]
-        if last and (footer := self._split_footer(data_rows)):
-            self._leave_out(footer, "below")
+            if row == self.titles:
+                self._titles_again = True
+            elif is_blank(row) or tuple(row) in self._above:
+                continue
+            elif self._is_summary(row):
+                self._summaries.append(row)
+            elif is_footer(row, self.first_row):
+                self._refuse_other_titles(number, row)
+                self._words.append((number, row))
+            else:
+                self._begin_block(data_rows, before)
+                data_rows.append((number, row))
+        if last and self._words:
+            self._leave_out([row for _, row in self._words], "below")
         return [number for number, _ in data_rows], [row for _, row in data_rows]
+
+    def _begin_block(self, data_rows: list[tuple[int, Row]], before: int) -> None:
+        """Before a row of data: what stood since the last one begins a block, or is no footer."""
+        if self._titles_again or any(any(map(str.isdigit, "".join(shown(row)))) for _, row in self._words):
+            if before + len(data_rows):
+                self.breaks.append(before + len(data_rows))
+                self.heads.append([shown(row) for _, row in self._words])
+        else:
+            data_rows += self._words  # what is wrong with them is said where they are read
+        self._words, self._titles_again, self._after_summary = [], False, False
+
+    def _is_summary(self, row: Row) -> bool:
+        """Whether a row says that it is made of those above: by a word for it, or as one begins it where others have a
+        number, and numbers follow."""
+        place = next((place for place, cell in enumerate(row) if cell not in (None, "")), 0)
+        has_values = sum(map(is_value, row))
+        first = sum(map(is_value, self.first_row))
+        labelled = (
+            place < len(self.first_row)
+            and not is_value(row[place])
+            and is_value(self.first_row[place])
+            and has_values >= max(2, first - 1)
+        )
+        said = not self._summarised and (_is_summary(row) or (self._after_summary and _is_summary(row, _BELOW_SUMMARY)))
+        self._after_summary = bool(has_values and (labelled or said))
+        return self._after_summary
+
+    def _refuse_other_titles(self, number: int, row: Row) -> None:
+        """Raise InvalidError on titles or units that are not those of the table."""
+        if _are_units(row) or (not any(map(is_value, row)) and recognised(list(map(_text, row)), ()) > 1):
+            got = " ".join(shown(row)).strip()[:MAX_QUOTED]
+            message = (
+                f"line {number} has other titles or units than the table above it, got {got!r}: send each table in a "
+                "separate file"
+            )
+            raise InvalidError.of(message, code="mixed_units", value=got)
 
     def end(self) -> None:
         """Say what was left out among the rows, once all are read."""
         if self._summaries:
             self._leave_out(self._summaries, "of means, extremes or sums in")
-
-    def _split_footer(self, held: list[tuple[int, Row]]) -> list[Row]:
-        """The rows at the end of `held` that are words, or that a word begins (`Mean;5;100;20`): taken out of it."""
-        end = len(held)
-        while end and is_footer(held[end - 1][1], self.first_row):
-            end -= 1
-        footer = [row for _, row in held[end:]]
-        del held[end:]
-        return footer
 
     def _leave_out(self, rows: Sequence[Row], where: str) -> None:
         first = " ".join(shown(rows[0])).strip()[:MAX_QUOTED]
@@ -132,8 +191,8 @@ class DataRows:
         self.notices.append(Notice(code="lines_left_out", message=message))
 
 
-def _is_summary(row: Row) -> bool:
-    return any(isinstance(cell, str) and _SUMMARY.fullmatch(cell) is not None for cell in row)
+def _is_summary(row: Row, words: re.Pattern[str] = _SUMMARY) -> bool:
+    return any(isinstance(cell, str) and words.fullmatch(cell) is not None for cell in row)
 
 
 def table_in(data: DataRows, *, first_line: int, rows_read: Callable[[], int], **others: Any) -> Table:
@@ -161,6 +220,7 @@ def table_in(data: DataRows, *, first_line: int, rows_read: Callable[[], int], *
         first_line=first_line,
         head=tuple(head),
         breaks=data.breaks,
+        heads=data.heads,
         notices=data.notices,
         **others,
     )
@@ -179,7 +239,7 @@ def _counted(columns: Sequence[FileColumn], head: Sequence[Sequence[str]]) -> st
 
 
 def shown(row: Row) -> tuple[str, ...]:
-    """The cells of a row as text."""
+    """The cells of a row as text, whole numbers without a decimal point."""
     return tuple(str(int(cell)) if isinstance(cell, float) and cell.is_integer() else _text(cell) for cell in row)
 
 
@@ -305,17 +365,36 @@ def _layout(
             )
             if enough and (best is None or rank > best[0]):
                 best = rank, titles, at
+    crossing = start - 1 if labelled and _crosses(rows[start - 1], rows[start]) else None
+    if crossing is not None and (best is None or best[0][0] + best[0][1] <= 1):
+        corner, *cells = shown(rows[crossing])
+        best = (2, 0, 1), [CORNER.split(corner)[0], *cells], crossing
+        labelled = 0
     if best is None:
         return None
     rank, titles, at = best
-    units = _units(rows, [row for row in above if row > at], at, start, titles, width)
-    groups = _filled([_text(cell) for cell in rows[at - 1]], len(titles)) if at - 1 in above else []
+    units = [] if at == crossing else _units(rows, [row for row in above if row > at], at, start, titles, width)
     twice = len(set(filter(None, titles))) < sum(map(bool, titles))
+    over_groups = at > 0 and (
+        at - 1 in above or (twice and not all(NUMBER.fullmatch(_text(cell)) for cell in rows[at - 1] if cell))
+    )
+    groups = _filled([_text(cell) for cell in rows[at - 1]], len(titles)) if over_groups else []
     extra_rows = (units[: len(titles)], groups if twice else (), rows[start][: len(titles)])
     headings = tuple(zip_longest(titles, *extra_rows, fillvalue=""))
     misfits = sum(bool(unit) and not _fits(title, unit) for title, unit, _, _ in headings)
     score = (rank[0] - misfits, rank[1], min(length - labelled, _LONG_RUN), sum(map(is_value, rows[start])))
     return Layout(headings=headings, titles=at, start=start, labelled=labelled, score=score)
+
+
+def _crosses(row: Row, below: Row) -> bool:
+    """Whether a row has values of another quantity over the columns below it (`Speed [rpm];2;4;6`): a word, and then numbers
+    that rise or fall, one over each column."""
+    cells = [with_unit_apart(cell)[0] for cell in row[1:]]
+    texts = [str(cell).strip().replace(",", ".") for cell in cells]
+    if len(row) != len(below) or len(cells) < 2 or is_value(row[0]) or not all(map(NUMBER.fullmatch, texts)):
+        return False
+    signs = {b > a for a, b in pairwise(map(float, texts))} if len(set(texts)) == len(texts) else set()
+    return len(signs) == 1
 
 
 def _text_rows_above(rows: Sequence[Row], comments: frozenset[int], start: int) -> list[int]:

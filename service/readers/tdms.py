@@ -4,7 +4,7 @@ Runs in the reading process of `sandbox`. Source: NI, TDMS File Format Internal 
 """
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -17,10 +17,11 @@ from numpy.typing import NDArray
 from service.errors import MAX_QUOTED, InvalidError
 from service.readers.arrays import refuse_counts, unit_of_array
 from service.readers.column_names import column_of
+from service.readers.constants import in_parts
 from service.readers.limits import Limits
 from service.readers.numerals import Stamps, is_stamp
 from service.readers.stated_clocks import evenly, in_seconds, stated_clock
-from service.readers.table import Clock, FileColumn, Reading, Table, cut_short
+from service.readers.table import Clock, FileColumn, Reading, Table, cut_short, index_of_wanted
 from service.readers.unit_table import conversion
 
 #: Kinds of scales that npTDMS computes.
@@ -35,7 +36,16 @@ def read_table(path: Path, reading: Reading, limits: Limits) -> Table:
     file = TdmsFile.open(path)
     if file.file_status.incomplete_final_segment:
         raise cut_short("its last TDMS segment is not complete")
-    groups = [group for group in file.groups() if not reading.table or group.name == reading.table]
+    groups = [group for group in file.groups() if any(len(channel) for channel in group.channels())]
+    if reading.reads_all():
+        return in_parts([_table(file, [group], group.name, limits) for group in groups])
+    if reading.table:
+        groups = [groups[index_of_wanted([group.name for group in groups], reading.table, "group")]]
+    return _table(file, groups, reading.table, limits)
+
+
+def _table(file: Any, groups: Sequence[Any], name: str, limits: Limits) -> Table:
+    """The channels of some groups."""
     channels = [channel for group in groups for channel in group.channels() if len(channel)]
     limits.require_columns(len(channels))
     scales = [_scales(channel) for channel in channels]
@@ -58,7 +68,11 @@ def read_table(path: Path, reading: Reading, limits: Limits) -> Table:
         return list(values_by_index.values())
 
     columns = tuple(_column(channel, len(groups) > 1, clock) for channel, clock in zip(channels, clocks, strict=True))
-    return Table(columns=columns, read=read, name=reading.table, others=tuple(group.name for group in file.groups()))
+    others = tuple(group.name for group in file.groups())
+    above = (
+        tuple((key, f"{value}") for key, value in group_properties[groups[0].name].items()) if len(groups) == 1 else ()
+    )
+    return Table(columns=columns, read=read, name=name, others=others, above=above)
 
 
 def _scales(channel: Any) -> dict[str, str]:

@@ -25,6 +25,7 @@ from service.errors import MAX_ERRORS, MAX_QUOTED, FieldError, InvalidError, Not
 from service.readers.column_names import named_columns, recognised
 from service.readers.detect import BINARY, ByteSource, Format, overdue, too_slow, utf_16
 from service.readers.limits import LIMITS, LONGEST_LINE_BYTES, Limits
+from service.readers.markup import as_lines
 from service.readers.numerals import Numerals, is_stamp
 from service.readers.plain_numbers import plain_columns
 from service.readers.table import Reading, Table
@@ -62,6 +63,10 @@ _OPEN = re.compile(r'(?:(?:[ \t]*"(?:[^"]|"")*+"[^;,\t|\n]*|(?![ \t]*")[^;,\t|\n
 _WORDS = re.compile(r"[^\d \n.,;:|\teETZ/+-]")
 #: The share of lines with a tab of a text that tabs separate. Chosen: title blocks have none.
 _MOST_OF = 0.8
+#: Digits and signs of numbers of full width, and what they stand for.
+_WIDE, _NARROW = re.compile("[０-９]"), str.maketrans("０１２３４５６７８９．，－＋：／　", "0123456789.,-+:/ ")
+#: Bytes of a text in HTML or XML. Chosen: a spreadsheet's 65,536 rows have less.
+_MOST_MARKED = 1 << 25
 #: Lines that one cell in quotes may go over.
 _MAX_CELL_LINES = 5
 
@@ -94,6 +99,8 @@ def read_text(opened: Open, reading: Reading, limits: Limits, *, any_encoding: b
     whole = len(first) < _HEAD
     if not whole and b"\n" in first and b"\0" not in first:  # whole lines alone; with zeros it may be UTF-16
         first = first[: first.rindex(b"\n") + 1]
+    if first.lstrip(b"\xef\xbb\xbf\xff\xfe\0 \r\n\t").startswith(b"<") and (lines := _unmarked(opened)) is not None:
+        return read_text(lambda: nullcontext(io.BytesIO(lines)), reading, limits)
     if not first.strip():
         rule = "is empty, and so is the rest of the file: send a file with a header and rows of numbers"
         raise wrong_line(1, rule, "no_header")
@@ -111,6 +118,19 @@ def read_text(opened: Open, reading: Reading, limits: Limits, *, any_encoding: b
     return table_in(
         body.data, first_line=form.first_line, read=body.read, rows_read=lambda: body.rows, line_of=body.line_of
     )
+
+
+def _unmarked(opened: Open) -> bytes | None:
+    """The lines of a text in HTML or XML; None where it is none. Raises TooLargeError."""
+    with opened() as source:
+        content = source.read(_MOST_MARKED + 1)
+    text = content.decode(_encodings(content, any_encoding=False)[0].replace("utf-8", "utf-8-sig"), "replace")
+    lines = as_lines(text)
+    if lines is not None and len(content) > _MOST_MARKED:
+        raise TooLargeError(
+            f"a table in HTML or XML must not be larger than {_MOST_MARKED} bytes: save it as CSV or XLSX"
+        )
+    return None if lines is None else lines.encode()
 
 
 # --- bytes -> lines ---
@@ -137,7 +157,7 @@ def _blocks(source: ByteSource, encoding: str) -> Iterator[_Block]:
     while block:
         following = source.read(_BLOCK)
         try:
-            text = unfinished + lines.decode(block, not following)
+            text = unfinished + _narrow(lines.decode(block, not following))
         except UnicodeError:
             rule = f"or a line soon after it is not {encoding.upper()}, unlike the lines before: "
             rule += "this is binary data after text; export the file as text" if b"\0" in block else "save it as UTF-8"
@@ -163,6 +183,11 @@ def _blocks(source: ByteSource, encoding: str) -> Iterator[_Block]:
             yield _Block(complete, last, ended, zeros)
         line += complete.count("\n")
         block = following
+
+
+def _narrow(text: str) -> str:
+    """A text with its digits of full width, as East Asian keyboards write them, and the signs of numbers as plain ones."""
+    return text.translate(_NARROW) if not text.isascii() and _WIDE.search(text) else text
 
 
 def _zeros_to_the_end(tail: str, following: bytes, source: ByteSource) -> int:
@@ -339,10 +364,15 @@ class _DataBody:
         self._separator = form.separator
         if form.separator == "  " and len(_cells(" ".join(first), " ")) == self._width:
             self._separator = " "  # titles are two blanks apart, cells may be one
-        self._numerals = Numerals(reading)
+        self._reading = reading
+        self._begin()
+
+    def _begin(self) -> None:
+        self.data.begin()
+        self._numerals = Numerals(self._reading)
         #: Of each block its first row, and the lines of its rows from 1; the line that comes next.
         self._lines: list[tuple[int, Sequence[int]]] = []
-        self._line = form.first_line
+        self._line = self._form.first_line
         #: How many rows were read.
         self.rows = 0
 
@@ -353,6 +383,7 @@ class _DataBody:
 
     def read(self, channels: Mapping[int, str]) -> list[NDArray[Any]]:
         """The columns [n] by index. Raises InvalidError naming line and value, TooLargeError past the limits."""
+        self._begin()
         self._settle(channels)
         times = [at for at, name in channels.items() if name == "time_s"]
         dated = any(is_stamp("".join(self.data.first_row[at : at + 1])) for at in times)

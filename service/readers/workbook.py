@@ -15,10 +15,10 @@ from python_calamine import CalamineWorkbook, SheetTypeEnum, SheetVisibleEnum
 
 from service.errors import InvalidError, Notice
 from service.readers.column_names import named_columns, recognised
-from service.readers.constants import one_below_the_other, value_within
+from service.readers.constants import in_parts
 from service.readers.detect import check_archive
 from service.readers.limits import Limits
-from service.readers.table import SHEETS, Reading, Table, index_of_wanted
+from service.readers.table import Reading, Table, index_of_wanted
 from service.readers.table_finder import MAX_ROWS, TURNED, DataRows, Layout, find_table, no_table, table_in, turned
 from service.readers.workbook_cells import SheetCells, sheet_cells
 
@@ -32,10 +32,10 @@ def read_table(path: Path, reading: Reading, limits: Limits) -> Table:
     book = CalamineWorkbook.from_path(str(path))
     sheets = [sheet.name for sheet in book.sheets_metadata if sheet.typ == SheetTypeEnum.WorkSheet]
     named = named_columns(reading)
-    if reading.table or len(sheets) == 1:
+    if (reading.table and not reading.reads_all()) or len(sheets) == 1:
         sheet, _, number = reading.table.rpartition("/")  # of tables below each other on a sheet
         wanted = sheet if sheet in sheets and number.isdecimal() else reading.table
-        sheets = [sheets[index_of_wanted(sheets, wanted, "sheet")]]
+        sheets = sheets if reading.reads_all() else [sheets[index_of_wanted(sheets, wanted, "sheet")]]
     tables: dict[str, tuple[list[Sequence[Any]], Layout]] = {}
     refused: list[InvalidError] = []
     on_side: set[str] = set()
@@ -56,31 +56,11 @@ def read_table(path: Path, reading: Reading, limits: Limits) -> Table:
         raise refused[0]
     visible = {sheet.name for sheet in book.sheets_metadata if sheet.visible == SheetVisibleEnum.Visible}
     tables = {name: cells for name, cells in tables.items() if name in visible} or tables
-    if channel := next((of for of, choice in reading.mapping.items() if choice.column == SHEETS), None):
-        return _stacked_sheets(channel, tables, hidden, tuple(sheets), limits)
+    if reading.reads_all() and tables:
+        return in_parts([_table(name, *tables[name], hidden[name], tuple(sheets), limits) for name in tables])
     name = list(tables)[index_of_wanted(list(tables) or sheets, "", "sheet")]
     table = _table(name, *tables[name], hidden[name], tuple(sheets), limits)
     return replace(table, notices=[*table.notices, TURNED]) if name in on_side else table
-
-
-def _stacked_sheets(
-    channel: str,
-    tables: dict[str, tuple[list[Sequence[Any]], Layout]],
-    hidden: Mapping[str, Collection[int]],
-    sheets: tuple[str, ...],
-    limits: Limits,
-) -> Table:
-    """The sheets whose names state a value of a channel, one below the other."""
-    named = {name: held[0] for name in tables if (held := value_within(name, channel))}
-    parts = [_table(name, *tables[name], hidden[name], sheets, limits) for name in named]
-    titles = [[(column.name, column.unit) for column in part.columns] for part in parts]
-    if not parts or any(own != titles[0] for own in titles):
-        message = f"map gives {channel} the values in the names of sheets, which must have the same columns"
-        raise InvalidError.of(message, code="invalid_map", pointer="/map", value=SHEETS)
-    first = replace(parts[0], name="", notices=[notice for part in parts for notice in part.notices])
-    return one_below_the_other(
-        first, channel, [*named.values()], lambda taken: [part.read(taken) for part in parts], SHEETS
-    )
 
 
 def _rows(book: CalamineWorkbook, sheet: str, path: Path | None) -> tuple[list[Sequence[Any]], set[int]]:

@@ -4,8 +4,11 @@ In: the file, and what was asked of it. Out: `Suggestion`, complete, for a perso
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, get_args
+
+import numpy as np
 
 from models.arrays import FloatArray
 from models.records.cleaning import UnusableRecordError
@@ -15,11 +18,14 @@ from service.clutch.incoming_run import SampledChannels
 from service.errors import InvalidError, ServiceError
 from service.readers.assemble import Channels
 from service.readers.read_file import read_file, suggest_file
-from service.readers.table import ColumnChoice, Reading
+from service.readers.table import NO_TIME, ColumnChoice, Reading
 from service.runs.file_names import suggested
 
 #: Rows that are shown.
 _ROWS = 2
+#: A step between rows that is none between samples of plateaus, s, and the confidence that such rows are plateaus. Chosen:
+#: records have at least 10 Hz.
+_LONGEST_STEP, _PLATEAUS = 1.0, 0.8
 _CHANNELS: Sequence[ChannelName] = get_args(ChannelName)
 
 
@@ -40,10 +46,15 @@ def suggestion_of(
         proposal = suggest_file(path, filename=filename, reading=reading)
         if proposal is None:
             return None
-        read = read_file(path, filename=filename, reading=proposal.reading)
+        reading, confidence = proposal.reading, proposal.confidence
+        read = read_file(path, filename=filename, reading=reading)
+        if kind != "dynamic_stribeck" and slower_than_samples(read.columns):
+            untimed = {channel: choice for channel, choice in reading.mapping.items() if channel != "time_s"}
+            reading = replace(reading, mapping=untimed, time=NO_TIME)
+            read, kind = read_file(path, filename=filename, reading=reading), "stationary_stribeck"
+            confidence = min(confidence, _PLATEAUS)
     except ServiceError:  # damaged, too large, no table, or busy: the refusal itself stands
         return None
-    reading = proposal.reading
     said = suggested(filename, beside, read.labels)
     kind = kind or said.named.kind or _kind(read.columns)
     columns = _columns(reading, proposal.titles)
@@ -70,7 +81,7 @@ def suggestion_of(
         kind=kind,
         cycles=said.named.cycles if cycles is None else cycles,
         clutch_id=said.named.clutch_id,
-        confidence=proposal.confidence,
+        confidence=confidence,
         rows=_rows(read),
         profile=profile,
     )
@@ -111,6 +122,13 @@ def _rows(read: Channels) -> list[dict[ChannelName, float]]:
 def _kind(columns: Mapping[str, FloatArray]) -> FileKindName:
     """A record in which nothing stays as it is for a while is a dynamic one."""
     return "dynamic_stribeck" if "time_s" in columns and holds_no_dwell(columns) else "stationary_stribeck"
+
+
+def slower_than_samples(columns: Mapping[str, FloatArray]) -> bool:
+    """Whether rows by their times are plateaus themselves: too far apart to be samples of some."""
+    time_s = columns.get("time_s")
+    slow = time_s is not None and time_s.size > 1 and float(np.median(np.diff(time_s))) >= _LONGEST_STEP
+    return slow and holds_no_dwell(columns)
 
 
 def holds_no_dwell(columns: Mapping[str, FloatArray]) -> bool:

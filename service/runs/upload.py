@@ -11,9 +11,9 @@ from service.clutch.incoming_run import IncomingRun, name_run
 from service.errors import FieldError, InvalidError, Notice
 from service.readers.assemble import LEFT_OUT, Channels
 from service.readers.read_file import read_file
-from service.readers.table import ColumnChoice, Reading
+from service.readers.table import NO_TIME, ColumnChoice, Reading
 from service.runs.rig_profile import Named, named
-from service.runs.suggestion import holds_no_dwell, suggestion_of
+from service.runs.suggestion import holds_no_dwell, slower_than_samples, suggestion_of
 
 #: The channels that each kind of run must have, and the channels that it may have.
 NEEDED = {
@@ -117,6 +117,12 @@ def run_of(read: Channels, head: IncomingRun) -> IncomingRun:
         columns = {name: column for name, column in columns.items() if name != "time_s"}
         check_columns(columns)  # a plateau has no negative pressure, which a sample may have
     accepted = (*NEEDED[kind], *_ALLOWED[kind])
+    if kind == "stationary_stribeck" and slower_than_samples(columns):
+        message = (
+            "the rows are too far apart in time for samples of plateaus: if each row is a plateau, send time=none; if they "
+            "are samples, send them at the rate at which they were taken"
+        )
+        raise InvalidError.of(message, code="rows_are_plateaus", pointer="/time", value=NO_TIME)
     channels = {name: column for name, column in columns.items() if name in accepted}
     file = {**(head.file or {}), "warnings": [asdict(notice) for notice in notices]}
     return name_run(replace(head, channels=channels, file=file))
