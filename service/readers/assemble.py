@@ -131,7 +131,7 @@ def _parts(table: Table) -> list[Table]:
 def below_each_other(parts: Sequence[Channels]) -> Channels:
     """The channels of a file's parts as one: those that all have, with times that go on. Raises InvalidError where they
     have none in common."""
-    names = [name for name in parts[0].columns if all(name in part.columns for part in parts)]
+    names = [name for name in (parts[0].columns if parts else ()) if all(name in part.columns for part in parts)]
     columns = {name: np.concatenate([part.columns[name] for part in parts]) for name in names}
     if not columns:
         message = "the parts of the file have no channel in common: choose one with table=NAME"

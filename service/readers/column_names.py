@@ -417,6 +417,8 @@ def _unit(channel: str, column: FileColumn, choice: ColumnChoice | None) -> str 
     A column that a map names may end in its unit, whatever parts them. Where a title says that its values are scaled, only
     the map says how.
     """
+    if column.title.startswith("=") and column.title != CELLS:
+        return column.unit  # what it stands for was converted
     public = key(column.name) == channel
     scaled = None if public else _SCALED.search(column.name[:LONGEST_NAME])
     asked_unit = None if choice is None else choice.unit

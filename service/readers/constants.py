@@ -35,7 +35,7 @@ def constants(table: Table, reading: Reading) -> dict[str, float]:
     """
     if reading.reads_all():
         return {}
-    stated = labels(table.above)
+    stated = labels((table.heads or [table.above])[0])
     return {
         channel: _value(channel, choice, stated) for channel, choice in reading.mapping.items() if choice.is_constant()
     }
@@ -71,7 +71,7 @@ def with_constants(table: Table, reading: Reading) -> Table:
 def _value_of(channel: str, choice: ColumnChoice, name: str, head: Sequence[Sequence[str]]) -> float:
     """A channel's value in one block, by the lines above it."""
     if choice.column != SHEETS:
-        return _value(channel, choice, labels(head))
+        return _value(channel, replace(choice, factor=1.0, offset=0.0), labels(head))
     value = value_of_part(name, head, channel)
     if value is None:
         part = repr(name[:MAX_QUOTED])

@@ -219,7 +219,8 @@ def _jumped_to(held: FloatArray, low: float, high: float) -> float | None:
 def drop_totals(
     columns: Mapping[int, NDArray[Any]], measured: list[int], table: Table
 ) -> tuple[dict[int, NDArray[Any]], Table]:
-    """Columns [n] by index and their table without the rows at its end that are the means, sums, maxima of those above."""
+    """Columns [n] by index and their table without the rows at an end of it, or of a level, that are the means, sums, maxima
+    of the others."""
     measured_columns = [columns[index] for index in measured]
     sizes = {column.size for column in measured_columns}
     numeric = all(column.dtype.kind in "iuf" for column in measured_columns)
@@ -228,13 +229,16 @@ def drop_totals(
     blocks = [*pairwise([0, *table.breaks, *sizes])]
     keep = np.ones(max(sizes), dtype=np.bool_)
     notices = []
-    for start, end in [*blocks, *_levels(measured_columns)]:
-        made_of = _totals([plain(column[start:end]) for column in measured_columns])
-        if made_of and keep[end - len(made_of) : end].all():
-            keep[end - len(made_of) : end] = False
-            line = end - len(made_of)
+    ends = [(*block, above) for block in blocks for above in (True, False)]
+    for start, end, above in [*ends, *_levels(measured_columns)]:
+        order = 1 if above else -1
+        made_of = _totals([plain(column[start:end])[::order] for column in measured_columns])
+        line = end - len(made_of) if above else start
+        if made_of and keep[line : line + len(made_of)].all():
+            keep[line : line + len(made_of)] = False
             where = f"line {table.line_of(line)}" if table.line_of else f"row {line + 1}"
-            noun, rows_of = "row" if len(made_of) == 1 else "rows", f"the {', '.join(made_of)} of the rows above"
+            noun, side = "row" if len(made_of) == 1 else "rows", "above" if above else "below"
+            rows_of = f"the {', '.join(made_of[::order])} of the rows {side}"
             message = f"left out: {len(made_of)} {noun} from {where} on, {rows_of}"
             notices.append(Notice(code="lines_left_out", message=message))
     if not notices:
@@ -249,13 +253,13 @@ def drop_totals(
     return {index: column[keep] if column.size == keep.size else column for index, column in columns.items()}, table
 
 
-def _levels(columns: Sequence[NDArray[Any]]) -> list[tuple[int, int]]:
+def _levels(columns: Sequence[NDArray[Any]]) -> list[tuple[int, int, bool]]:
     """Where the rows begin and end in which a column stays as it is: levels of a test, which may have a mean each."""
     found = []
     for column in columns:
         ends = [0, *(np.flatnonzero(np.diff(plain(column)) != 0) + 1), column.size]
         if 1 < len(ends) - 1 <= column.size / _SHORTEST_LEVEL:
-            found += [(start, end) for start, end in pairwise(map(int, ends)) if end - start >= _SHORTEST_LEVEL]
+            found += [(start, end, True) for start, end in pairwise(map(int, ends)) if end - start >= _SHORTEST_LEVEL]
     return found
 
 

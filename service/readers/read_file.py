@@ -11,7 +11,7 @@ from pathlib import Path, PurePath
 from typing import Any
 
 from service.channels import CHANNELS
-from service.errors import InvalidError
+from service.errors import MAX_QUOTED, InvalidError, Notice
 from service.readers import sandbox
 from service.readers.assemble import Channels, below_each_other, to_channels
 from service.readers.column_names import parse_map
@@ -27,6 +27,8 @@ from service.readers.text import read_text
 _MAX_TRIED = 10
 #: The confidence that files of one archive are parts of one test. Chosen.
 _ALL = 0.8
+#: What is wrong with a file beside the records of an archive, such as a note.
+_NO_PART = ("no_header", "no_such_column", "title_too_long")
 
 
 def reading_of(mapping: str | None = None, **others: Any) -> Reading:
@@ -114,9 +116,21 @@ def _all_of_archive(names: Sequence[str], read: Callable[[str, Reading], Any], r
         stated = {channel: _by_name(name, channel, choice) for channel, choice in reading.mapping.items()}
         return replace(reading, table="", mapping=stated)
 
-    if answer == "preview":
-        return read(names[0], asked(names[0]))
-    return below_each_other([read(name, asked(name)) for name in names])
+    found: list[Any] = []
+    notes: list[str] = []
+    for name in names:
+        try:
+            found.append(read(name, asked(name)))
+        except InvalidError as error:
+            if not error.errors or error.errors[0].code not in _NO_PART:
+                raise
+            notes.append(name)
+        if found and answer == "preview":
+            return found[0]
+    joined = below_each_other(found)
+    message = f"left out, because other columns stand in it: {', '.join(notes)[:MAX_QUOTED]}"
+    notice = Notice(code="parts_left_out", message=message)
+    return replace(joined, notices=(*joined.notices, notice)) if notes else joined
 
 
 def _by_name(name: str, channel: str, choice: ColumnChoice) -> ColumnChoice:

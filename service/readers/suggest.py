@@ -181,10 +181,9 @@ def _only(asked: Reading, constant: str) -> dict[str, ColumnChoice]:
 def _crossed(table: Table, asked: Reading) -> tuple[Reading, float] | None:
     """How a table is read whose titles are values, of pressure over a column of speeds or of speed over one of pressures,
     and whose cells are torques; None where it is of another form."""
-    at_numbers = [
-        at for at, own in enumerate(table.columns) if at and with_unit_apart(own.title)[0] and is_value(own.title)
-    ]
-    if len(at_numbers) != len(table.columns) - 1 or len(at_numbers) < 2 or asked.mapping:
+    over = [own for own in table.columns[1:] if own.title]
+    plain_values = all(is_value(with_unit_apart(own.title)[0]) for own in over)
+    if len(over) < 2 or asked.mapping or not (plain_values or any(_all_values(over, of) for of in _NEEDED)):
         return None
     down = table.columns[0]
     texts = [part for row in (table.heads or [()])[0] for cell in row for part in CORNER.split(cell)]
@@ -195,17 +194,24 @@ def _crossed(table: Table, asked: Reading) -> tuple[Reading, float] | None:
     if not max(likely.values()):
         return None
     under, across = sorted(likely, key=lambda channel: likely[channel], reverse=True)
-    in_titles = column_of(table.columns[1].title).unit or with_unit_apart(table.columns[1].title)[1]
-    stated = in_titles or _unit_among(texts, across)
+    in_titles = _all_values(over, across)
+    if not in_titles and not plain_values:
+        return None
+    stated = None if in_titles else _unit_among(texts, across)
     mapping = {
         under: ColumnChoice(column=_title(down), unit=None if down.unit else _unit_among(texts, under)),
-        across: ColumnChoice(column=COLUMNS, unit=None if in_titles else stated),
+        across: ColumnChoice(column=COLUMNS, unit=stated),
         "torque_nm": ColumnChoice(column=CELLS, unit=_unit_among(texts, "torque_nm")),
     }
-    sure = stated and mapping["torque_nm"].unit and (down.unit or mapping[under].unit)
-    if not stated:
+    sure = (stated or in_titles) and mapping["torque_nm"].unit and (down.unit or mapping[under].unit)
+    if not stated and not in_titles:
         mapping[across] = replace(mapping[across], unit=CHANNELS[across].unit)
     return replace(asked, mapping=mapping), _CONSTANT if sure else _UNIT_BY_SIZE
+
+
+def _all_values(columns: Sequence[FileColumn], channel: str) -> bool:
+    """Whether the titles of all columns are nothing but a value of a channel (`p=2bar`)."""
+    return all((value_of_column(own, channel) or (0, ""))[1] == CELLS for own in columns)
 
 
 def _unit_among(texts: Sequence[str], channel: str) -> str | None:
@@ -382,7 +388,8 @@ def _constant(table: Table, filename: str, asked: Reading) -> str | None:
         return SHEETS
     for label, text in labels((table.heads or [table.above])[0]).items():
         name = label.rstrip(":= ")
-        of, sense = meaning(re.sub(r"[\[(].*", "", name).strip())
+        own = column_of(name)
+        of, sense = meaning(own.name, own.unit)
         if of == "pressure_bar" and sense in _SURE and re.match(r"[+-]?\d+(?:[.,]\d+)?\s*\S{0,6}$", text):
             return f"={name}"
     held = value_within(PurePath(filename).stem.replace("_", " ").replace("-", " "), "pressure_bar")

@@ -6,7 +6,7 @@ name over several columns may stand there too.
 """
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise, zip_longest
 from typing import Any
@@ -46,9 +46,10 @@ _SUMMARY = re.compile(
 )
 #: What stands between the two quantities of a table's corner (`n [1/min] \ p [bar]`).
 CORNER = re.compile(r"\s*[\\|↓→]\s*|\s+/\s+")
+_BRACKETS = re.compile(r"[\[(]")
 #: The same below such a row.
 _BELOW_SUMMARY = re.compile(
-    r"[#]? ?(?:n|no|cnt|count|number|anzahl|points|s|sd|sigma|σ|cv|rms|var|varian[cz]e?|q\d*|p\d+).{0,12}",
+    r"[#]? ?(?:n|no|cnt|count|number|anzahl|points|s|sd|sigma|σ|cv|rms|var|varian[cz]e?|q\d*|p\d+|\d\d? ?%).{0,12}",
     re.IGNORECASE,
 )
 #: What a row begins with that holds a factor for each column.
@@ -114,14 +115,18 @@ class DataRows:
         self.notices.clear()
         self._summaries: list[Row] = []
         self._after_summary = False
-        #: Lines of words that may be a footer or begin a block, and whether the titles stood again among them.
+        #: Lines of words that may be a footer or begin a block, comments beside them, and whether the titles stood again.
         self._words: list[tuple[int, Row]] = []
+        self._comments: list[Row] = []
         self._titles_again = False
         if self._labelled:
             self._leave_out(self._labelled, "above the first row of")
 
-    def of(self, rows: Iterable[tuple[int, Row]], before: int, *, last: bool) -> tuple[list[int], list[Any]]:
-        """Numbers and cells of those of the next rows that are data; `before` were found already, `last`: none follow.
+    def of(
+        self, rows: Iterable[tuple[int, Row]], before: int, *, last: bool, comments: Collection[int] = ()
+    ) -> tuple[list[int], list[Any]]:
+        """Numbers and cells of those of the next rows that are data; `before` were found already, `last`: none follow;
+        `comments`: numbers of those that are no data, but may say what a block is.
 
         Raises InvalidError on a row of other titles or other units.
         """
@@ -129,6 +134,8 @@ class DataRows:
         for number, row in rows:
             if row == self.titles:
                 self._titles_again = True
+            elif number in comments:
+                self._comments.append(row)
             elif is_blank(row) or tuple(row) in self._above:
                 continue
             elif self._is_summary(row):
@@ -148,10 +155,10 @@ class DataRows:
         if self._titles_again or any(any(map(str.isdigit, "".join(shown(row)))) for _, row in self._words):
             if before + len(data_rows):
                 self.breaks.append(before + len(data_rows))
-                self.heads.append([shown(row) for _, row in self._words])
+                self.heads.append([shown(row) for row in (*self._comments, *(row for _, row in self._words))])
         else:
             data_rows += self._words  # what is wrong with them is said where they are read
-        self._words, self._titles_again, self._after_summary = [], False, False
+        self._words, self._comments, self._titles_again, self._after_summary = [], [], False, False
 
     def _is_summary(self, row: Row) -> bool:
         """Whether a row says that it is made of those above: by a word for it, or as one begins it where others have a
@@ -354,6 +361,8 @@ def _layout(
     data = [row for row in rows[start : start + length] if not is_blank(row)][:_LONG_RUN]
     best: tuple[tuple[int, int, int], list[str], int] | None = None
     for place, at in enumerate(above):
+        if width > 1 and _states_value(rows[at]):
+            continue
         for titles in _titles(rows, above[place:], width, data):
             filled = sum(map(bool, titles))
             channel_count = 0 if _are_units(titles) else recognised(titles, named)  # `rpm` is both
@@ -384,6 +393,12 @@ def _layout(
     misfits = sum(bool(unit) and not _fits(title, unit) for title, unit, _, _ in headings)
     score = (rank[0] - misfits, rank[1], min(length - labelled, _LONG_RUN), sum(map(is_value, rows[start])))
     return Layout(headings=headings, titles=at, start=start, labelled=labelled, score=score)
+
+
+def _states_value(row: Row) -> bool:
+    """Whether a row is one cell that states a value (`p = 4 bar`): a block's, and no title."""
+    texts = list(filter(None, map(_text, row)))
+    return len(texts) == 1 and re.search(r"[=: ]\s*\d", texts[0]) is not None and _BRACKETS.search(texts[0]) is None
 
 
 def _crosses(row: Row, below: Row) -> bool:
