@@ -140,7 +140,7 @@ class DataRows:
                 continue
             elif self._is_summary(row):
                 self._summaries.append(row)
-            elif is_footer(row, self.first_row):
+            elif is_footer(row, self.first_row) or self._is_label(row):
                 self._refuse_other_titles(number, row)
                 self._words.append((number, row))
             else:
@@ -175,6 +175,11 @@ class DataRows:
         said = not self._summarised and (_is_summary(row) or (self._after_summary and _is_summary(row, _BELOW_SUMMARY)))
         self._after_summary = bool(has_values and (labelled or said))
         return self._after_summary
+
+    def _is_label(self, row: Row) -> bool:
+        """Whether a row is nothing but a value with its unit (`4 bar`), where others have several cells."""
+        filled = [cell for cell in row if cell not in (None, "")]
+        return len(filled) == 1 < len(self.first_row) and bool(with_unit_apart(filled[0])[1])
 
     def _refuse_other_titles(self, number: int, row: Row) -> None:
         """Raise InvalidError on titles or units that are not those of the table."""

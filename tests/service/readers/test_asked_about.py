@@ -1,0 +1,191 @@
+"""What is not read without a question, as any reading of it is a guess, and what is suggested."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from service.api.rig import Suggestion
+from service.errors import InvalidError
+from service.readers.read_file import read_file, reading_of
+from service.runs.upload import read_file_run
+from tests.service.readers.test_parts import SPEEDS, STACKED, TORQUES, rows, same, suggested
+
+P, N, M = (STACKED[name].tolist() for name in ("pressure_bar", "speed_rpm", "torque_nm"))
+TITLES = "p [bar];n [1/min];M [Nm]\n"
+
+
+def refused(tmp_path: Path, content: str, message: str) -> Suggestion | None:
+    """What is suggested where a file is refused with a message."""
+    (tmp_path / "a.csv").write_text(content)
+    with pytest.raises(InvalidError, match=message) as caught:
+        read_file_run(tmp_path / "a.csv", filename="a.csv", kind="stationary_stribeck", cycles=0)
+    suggestion = caught.value.suggestion
+    assert suggestion is None or isinstance(suggestion, Suggestion)
+    return suggestion
+
+
+@pytest.mark.parametrize("step", [5, 30, 60])
+def test_rows_too_far_apart_for_samples_are_plateaus(tmp_path: Path, step: int) -> None:
+    (tmp_path / "a.csv").write_text("t [s];" + TITLES + rows([step * k for k in range(12)], P, N, M))
+    assert same(tmp_path / "a.csv").time == "none"
+
+
+def test_several_questions_have_one_answer(tmp_path: Path) -> None:
+    """No units, a mark, a decimal sign that is not clear, and a clock."""
+    torques = [f"{m:.3f}".replace(".", ",") for m in M]
+    torques[4] = "---"
+    cells = ([f"{30 * k:.3f}".replace(".", ",") for k in range(12)], [f"{p:.3f}".replace(".", ",") for p in P])
+    (tmp_path / "a.csv").write_text("t [s];P_Zyl;n_Schlupf;M_R\n" + rows(*cells, [f"{n:.0f}" for n in N], torques))
+    suggestion = same(tmp_path / "a.csv", {name: np.delete(values, 4) for name, values in STACKED.items()})
+    assert (suggestion.time, suggestion.missing, suggestion.decimal) == ("none", "---", ",")
+
+
+@pytest.mark.parametrize("timed", [False, True])
+def test_merged_cells_hold_the_value_above(tmp_path: Path, timed: bool) -> None:
+    pressures = [p if k % 4 == 0 else "" for k, p in enumerate(P)]
+    times = [[0.01 * k for k in range(12)]] if timed else []
+    (tmp_path / "a.csv").write_text("t [s];" * timed + TITLES + rows(*times, pressures, N, M))
+    assert same(tmp_path / "a.csv").missing == "above"
+    lower_rate = reading_of(missing="empty")
+    left = read_file(tmp_path / "a.csv", filename="a.csv", reading=lower_rate).columns["pressure_bar"].size
+    assert left == (12 if timed else 3)
+
+
+@pytest.mark.parametrize(
+    "titles", ["Pressure [psi];Pressure [bar];n [1/min];M [Nm]\n", "Pressure;Pressure;n;M\npsi;bar;1/min;Nm\n"]
+)
+def test_one_quantity_in_two_units_is_one_column(tmp_path: Path, titles: str) -> None:
+    (tmp_path / "a.csv").write_text(titles + rows([round(14.5038 * p, 4) for p in P], P, N, M))
+    assert same(tmp_path / "a.csv").confidence > 0.9
+
+
+@pytest.mark.parametrize("titles", ["M 1 [Nm];M 2 [Nm]", "Torque raw [Nm];Torque corrected [Nm]", "M;M"])
+def test_of_columns_that_differ_none_is_suggested(tmp_path: Path, titles: str) -> None:
+    units = "\nbar;1/min;Nm;Nm\n" if titles == "M;M" else "\n"
+    given = "p;n;" if titles == "M;M" else "p [bar];n [1/min];"
+    suggestion = refused(
+        tmp_path, given + titles + units + rows(P, N, M, [m + 0.5 for m in M]), "must be one column|needs torque"
+    )
+    assert suggestion is None or suggestion.map["torque_nm"] == "Torque corrected"
+
+
+def test_of_two_pressures_that_is_suggested_by_which_the_torque_goes(tmp_path: Path) -> None:
+    lube = [0.7, 0.71, 0.69] * 4
+    (tmp_path / "a.csv").write_text("p1 [bar];p2 [bar];n [1/min];M [Nm]\n" + rows(lube, P, N, M))
+    assert suggested(tmp_path / "a.csv").map["pressure_bar"] == "p2"
+
+
+@pytest.mark.parametrize("title", ["Torque per face [Nm]", "Moment je Reibfläche [Nm]", "Torque/face [Nm]"])
+def test_a_torque_of_a_face_is_none_of_the_clutch(tmp_path: Path, title: str) -> None:
+    assert refused(tmp_path, f"p [bar];n [1/min];{title}\n" + rows(P, N, M), "needs torque_nm|no channel") is None
+
+
+@pytest.mark.parametrize("unit", ["%FS", "%", "% v.E."])
+def test_a_pressure_in_percent_is_none_in_bar(tmp_path: Path, unit: str) -> None:
+    assert (
+        refused(tmp_path, f"Druck [{unit}];n [1/min];M [Nm]\n" + rows([10 * p for p in P], N, M), "unit|needs") is None
+    )
+
+
+def test_torques_of_exactly_zero_are_asked_about(tmp_path: Path) -> None:
+    torques = [0 if p == 4 else m for p, m in zip(P, M, strict=True)]
+    suggestion = refused(
+        tmp_path, TITLES + rows(P, N, torques), "is exactly 0, as in the 3 rows|is exactly 0, as in the 2 rows"
+    )
+    assert suggestion is not None
+    assert suggestion.missing == "torque_nm:0"
+    assert same(tmp_path / "a.csv", {name: np.delete(values, range(4, 8)) for name, values in STACKED.items()})
+    assert (
+        read_file(tmp_path / "a.csv", filename="a.csv", reading=reading_of(missing="none")).columns["torque_nm"].size
+        == 12
+    )
+
+
+def test_torques_of_zero_at_standstill_or_without_pressure_are_read(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text(TITLES + rows([0, 0, 0, 5, 5, 5, *P], [9, 9, 9, 0, 0, 0, *N], [0] * 6 + M))
+    assert read_file(tmp_path / "a.csv", filename="a.csv").columns["torque_nm"].size == 18
+
+
+def test_a_level_in_another_unit_is_asked_about(tmp_path: Path) -> None:
+    pressures = [100 * p if p == 4 else p for p in P]
+    assert refused(tmp_path, TITLES + rows(pressures, N, M), "are these rows in another unit") is None
+
+
+STATISTICS = {
+    "mean": np.mean, "s": lambda column: np.std(column, ddof=1), "min": np.min, "max": np.max, "n": len,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("chosen", [["mean", "s", "min", "max", "n"], ["mean", "s", "n"]])
+@pytest.mark.parametrize("label", ["", "first", "last"])
+def test_statistics_below_a_table_are_left_out(tmp_path: Path, chosen: list[str], label: str) -> None:
+    numbers = [str(k + 1) for k in range(12)]
+    text = {"": TITLES, "first": "Nr;" + TITLES, "last": TITLES.replace("\n", ";Remark\n")}[label]
+    text += rows(*([numbers] if label == "first" else []), P, N, M, *([["ok"] * 12] if label == "last" else []))
+    for name in chosen:
+        cells = [f"{STATISTICS[name](column):.3f}" for column in (P, N, M)]
+        text += ";".join([name] * (label == "first") + cells + [name] * (label == "last")) + "\n"
+    (tmp_path / "a.csv").write_text(text)
+    read = read_file(tmp_path / "a.csv", filename="a.csv")
+    assert read.columns["torque_nm"].tolist() == M
+    assert any(f"left out: {len(chosen)}" in notice.message for notice in read.notices)
+
+
+@pytest.mark.parametrize("named", [True, False])
+def test_means_below_each_level_are_left_out(tmp_path: Path, named: bool) -> None:
+    speeds = [*SPEEDS, 2400.0]
+    text, kept = ("Nr;" if named else "") + TITLES, []
+    for p, m in TORQUES.items():
+        torques = [*m, m[-1] + 0.3]
+        text += rows(*([[1, 2, 3, 4, 5]] if named else []), [p] * 5, speeds, torques)
+        text += (f"Mittel {p:g} bar;" if named else "") + f"{p};{np.mean(speeds):.3f};{np.mean(torques):.3f}\n"
+        kept += torques
+    (tmp_path / "a.csv").write_text(text)
+    assert read_file(tmp_path / "a.csv", filename="a.csv").columns["torque_nm"].tolist() == kept
+
+
+MARKED_UP = {
+    "HTML": (
+        "<html><body><table><tr><td>Prüfer</td></tr></table><table>", "<tr>",
+        "<td align=right>", "</td>", "</tr>", "</table></body></html>",
+    ),
+    "XML": (
+        '<?xml version="1.0"?><Workbook xmlns:ss="x"><Worksheet ss:Name="a"><Table>', "<Row>",
+        '<Cell><Data ss:Type="Number">', "</Data></Cell>", "</Row>", "</Table></Worksheet></Workbook>",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("parts", MARKED_UP.values(), ids=MARKED_UP)
+@pytest.mark.parametrize("encoding", ["utf-8", "cp1252", "utf-16"])
+def test_tables_in_html_and_xml_are_read(tmp_path: Path, parts: tuple[str, ...], encoding: str) -> None:
+    start, row, cell, end_cell, end_row, end = parts
+    lines = [TITLES.strip().split(";"), *zip(map(str, P), map(str, N), map(str, M), strict=True)]
+    text = start + "".join(row + "".join(f"{cell}{own}{end_cell}" for own in line) + end_row for line in lines) + end
+    (tmp_path / "a.xls").write_bytes(text.encode(encoding))
+    assert read_file(tmp_path / "a.xls", filename="a.xls").columns["torque_nm"].tolist() == M
+
+
+def test_cells_of_xml_stand_where_their_index_says(tmp_path: Path) -> None:
+    cells = ['<Cell ss:Index="2">', '<Cell ss:Index="4">', "<Cell>"]
+    row = "<Row>" + "".join(f"{cell}<Data>{{}}</Data></Cell>" for cell in cells) + "</Row>"
+    lines = [TITLES.strip().split(";"), *zip(P, N, M, strict=True)]
+    text = (
+        "<?xml version='1.0'?><Workbook><Table>" + "".join(row.format(*line) for line in lines) + "</Table></Workbook>"
+    )
+    (tmp_path / "a.xls").write_text(text)
+    assert read_file(tmp_path / "a.xls", filename="a.xls").columns["speed_rpm"].tolist() == N
+
+
+def test_digits_of_full_width_are_digits(tmp_path: Path) -> None:
+    wide = rows(P, N, M).translate(str.maketrans("0123456789.", "０１２３４５６７８９．"))
+    (tmp_path / "a.csv").write_text(TITLES + wide, encoding="utf-8")
+    assert read_file(tmp_path / "a.csv", filename="a.csv").columns["torque_nm"].tolist() == M
+
+
+def test_a_comment_within_a_table_is_none_of_its_rows(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text(
+        TITLES + rows(P[:4], N[:4], M[:4]) + "# oil topped up at 12\n" + rows(P[4:], N[4:], M[4:])
+    )
+    assert read_file(tmp_path / "a.csv", filename="a.csv").columns["torque_nm"].tolist() == M
