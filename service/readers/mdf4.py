@@ -36,7 +36,8 @@ def read_table(path: Path, reading: Reading, limits: Limits) -> Table:
     if not version.startswith("4"):
         raise InvalidError(f"an MDF file must be of version 4, got {version!r}: convert it with asammdf (MDF.convert)")
     shutil.copy = shutil.copyfile  # asammdf's copy for finalising also sets the mode, which this process may not
-    file = MDF(path)
+    # a file that is not mapped into memory takes less of it; what has to be finalised is copied by its path
+    file = MDF(path if head.startswith(b"UnFinMF") else path.open("rb"))
     masters = "time_s" in choices_of(reading)  # a map may name a master channel for the time
     places = list(_places(file, masters=masters, table=reading.table))
     limits.require_columns(len(places))

@@ -91,7 +91,9 @@ def refuse_no_torque(columns: Mapping[str, FloatArray], line_of: LineOf | None, 
     friction has a torque there, and a sensor its noise."""
     needed = [columns.get(name) for name in ("pressure_bar", "speed_rpm", "torque_nm")]
     pressure, speed, torque = needed
-    if reading.missing == NO_MISSING or pressure is None or speed is None or torque is None or not torque.any():
+    if reading.missing == NO_MISSING or pressure is None or speed is None or torque is None:
+        return
+    if not _MIN_ZEROS <= torque.size - np.count_nonzero(torque) < torque.size:
         return
     slips = (np.abs(speed) > _OF_LARGEST * np.abs(speed).max()) & (pressure > _OF_LARGEST * pressure.max())
     zero = np.concatenate([[0], (slips & (torque == 0)).view(np.int8), [0]])
@@ -116,9 +118,12 @@ def refuse_other_unit(columns: Mapping[str, FloatArray], line_of: LineOf | None,
     pressure, torque = columns.get("pressure_bar"), columns.get("torque_nm")
     if reading.missing == NO_MISSING or pressure is None or torque is None or pressure.size < 2 * _MIN_ZEROS:
         return
-    usual = np.median(np.abs(torque)) / max(float(np.median(np.abs(pressure))), 1e-9)
-    ratio = np.abs(torque) / np.maximum(np.abs(pressure), 1e-9)
-    high = (np.abs(pressure) > _OTHER_UNIT * np.median(np.abs(pressure))) & (ratio < usual / _OTHER_UNIT)
+    step = max(1, pressure.size // _MAX_SAMPLED)
+    most = _OTHER_UNIT * float(np.median(np.abs(pressure[::step])))
+    if pressure.max() <= most:
+        return
+    usual = float(np.median(np.abs(torque[::step]))) / max(most / _OTHER_UNIT, 1e-9)
+    high = (pressure > most) & (np.abs(torque) < usual / _OTHER_UNIT * pressure)
     if np.count_nonzero(high) < _MIN_ZEROS or not usual:
         return
     row = int(high.argmax())

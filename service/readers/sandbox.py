@@ -19,7 +19,7 @@ import sys
 import tempfile
 from collections.abc import Mapping
 from dataclasses import asdict
-from functools import partial
+from functools import lru_cache, partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, BinaryIO, Literal
@@ -31,12 +31,13 @@ from service.channels import CHANNELS
 from service.errors import BusyError, FieldError, InvalidError, Notice, ServiceError, TooLargeError, exit_text
 from service.readers import zygote
 from service.readers.assemble import Channels, to_channels
+from service.readers.column_names import column_of
 from service.readers.confinement import close_files, close_network_and_processes
 from service.readers.detect import Format, is_packed, opened, overdue, too_slow
-from service.readers.limits import Limits
+from service.readers.limits import LIMITS, Limits
 from service.readers.preview import preview
 from service.readers.suggest import Proposal, propose
-from service.readers.table import ColumnChoice, Reading
+from service.readers.table import ColumnChoice, Reading, Table
 
 #: The module that reads each format, the package it needs, and the extra of ours that installs it ("": always there).
 READERS = {
@@ -212,6 +213,16 @@ def _load(request: Mapping[str, Any]) -> None:
     """The module that reads a format, kept for further files; what keeps it from loading is the child's to say."""
     with contextlib.suppress(Exception):
         importlib.import_module(READERS[Format(request["kind"])][0])
+        _warm_up()
+
+
+@lru_cache(maxsize=1)
+def _warm_up() -> None:
+    """Read a small table, so that what reading compiles and imports on its first use is there for each file: a third of what
+    a record of a million values takes."""
+    columns = tuple(map(column_of, ("Time [s]", "Pressure [bar]", "Speed [1/min]", "Torque [Nm]")))
+    values = np.arange(1.0, 9.0)
+    to_channels(Table(columns=columns, read=lambda taken: [values.copy() for _ in taken]), Reading(), LIMITS)
 
 
 def _read(request: Mapping[str, Any], answer: int) -> None:
