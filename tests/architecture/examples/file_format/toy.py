@@ -13,10 +13,11 @@ from service.readers.limits import Limits
 from service.readers.table import Reading, Table
 
 
-def read_table(path: Path, _reading: Reading, _limits: Limits) -> Table:
+def read_table(path: Path, _: Reading, limits: Limits) -> Table:
     """The table of the whole file."""
-    head, _, body = path.read_bytes().partition(b"\n")
+    head, _separator, body = path.read_bytes().partition(b"\n")
     names = head.decode("utf-8", "replace").removeprefix("TOY1 ").split(",")
+    limits.require_columns(len(names))
     if len(body) % (8 * len(names)):
         raise InvalidError(f"the toy file must hold whole rows of {8 * len(names)} bytes, got {len(body)} bytes")
     rows = np.frombuffer(body, dtype="<f8").reshape(-1, len(names))
