@@ -129,7 +129,11 @@ FileMap = Annotated[
     Field(max_length=base.LONGEST_MAP, description="The columns of the channels, such as torque_nm:Mz,speed_rpm:n"),
 ]
 FileTable = Annotated[
-    str, Field(max_length=base.LONGEST_FILENAME, description="The sheet, group or archived file, if there are several")
+    str,
+    Field(
+        max_length=base.LONGEST_FILENAME,
+        description="The sheet, group or archived file, if there are several; `*`: all",
+    ),
 ]
 FileTime = Annotated[
     str, Field(max_length=base.LONGEST_FILENAME, description="The time column; `none`: each row is a plateau")
@@ -141,8 +145,8 @@ FileMissing = Annotated[
     str,
     Field(
         max_length=base.LONGEST_FILENAME,
-        description="Marks of missing values, such as -9999,n/a: rows with one, or with an empty cell, are left "
-        "out; `none`: all numbers are measurements",
+        description="Marks of missing values, such as -9999,n/a, of one channel as torque_nm:0: rows with one, or with an "
+        "empty cell, are left out; `above`: an empty cell holds the value above it; `none`: all numbers are measurements",
     ),
 ]
 FileGood = Annotated[

@@ -23,7 +23,7 @@ class RigColumn(Schema):
 
     title: Annotated[str, StringConstraints(min_length=1, max_length=base.LONGEST_TITLE)] = Field(
         description="Its title in the file, without the unit; `group/title` in files with groups. Of a channel without a"
-        " column `=5 bar`, `=LABEL` of a cell above the table, `=columns` or `=sheets` (a value in their names)"
+        " column `=5 bar`, `=LABEL` of a cell above the table, `=columns` or `=sheets` (a value in their names), `=cells`"
     )
     channel: ChannelName | None = Field(default=None, description="The channel; null: ignore the column")
     unit: Text | None = Field(default=None, description="Its unit; null: the unit in the file")
@@ -54,15 +54,16 @@ class RigProfile(Schema):
     )
     table: Text | None = Field(
         default=None,
-        description="The sheet, group or test of a file with several, by name or number from 1; null: the only one",
+        description="The sheet, group or test of several, by name or number from 1; `*`: all; null: the only one",
     )
     skip_rows: Annotated[int, Field(ge=0, le=base.MAX_SKIPPED)] = Field(
         default=0, description="Number of lines above the titles to skip"
     )
     missing: Text | None = Field(
         default=None,
-        description="Marks of missing values, such as `-9999,n/a`: rows with one, or with an empty cell, are left"
-        " out; `none`: all numbers are measurements; null: a file with suspicious numbers is refused",
+        description="Marks of missing values, such as `-9999,n/a`, of a channel as `torque_nm:0`: rows with one, or with an"
+        " empty cell, are left out; `above`: an empty cell holds the value above it; `none`: all numbers are measurements;"
+        " null: a file with suspicious numbers is refused",
     )
     good: Text | None = Field(
         default=None,

@@ -34,8 +34,9 @@ _ENDS = {2**bits - end for bits in (15, 16, 31, 32) for end in (0, 1)}
 #: Values at either end of a column that may each stand for none, rows at a table's end that may each be made of those above,
 #: and rows of a table beyond which nobody writes such ones. Chosen.
 _MAX_KINDS, _MAX_TOTALS, _LONGEST = 3, 8, 100_000
-#: Rows of a level that may have a mean below it. Chosen: fewer are one by chance too often.
-_SHORTEST_LEVEL = 5
+#: Rows of a level that may have a mean below it, and of a table with such levels. Chosen: fewer are one by chance too often,
+#: and a person writes no more.
+_SHORTEST_LEVEL, _LONGEST_OF_LEVELS = 5, 2000
 #: Rows by which the decimals of a column are counted. Chosen: of so many, not all end in zeros by chance.
 _MAX_LOOKED_AT = 50
 #: Values by which the usual size of a column is found. Chosen: their median is known to some percent; ten times is asked.
@@ -234,10 +235,11 @@ def drop_totals(
     blocks = [*pairwise([0, *table.breaks, *sizes])]
     keep = np.ones(max(sizes), dtype=np.bool_)
     notices = []
-    ends = [(*block, above) for block in blocks for above in (True, False)]
-    for start, end, above in [*ends, *_levels(measured_columns)]:
+    ends = [(*block, above, _MAX_TOTALS) for block in blocks for above in (True, False)]
+    levels = [(*level, True, 1) for level in _levels(measured_columns)]
+    for start, end, above, most in [*ends, *levels]:
         order = 1 if above else -1
-        made_of = _totals([plain(column[start:end])[::order] for column in measured_columns])
+        made_of = _totals([plain(column[start:end])[::order] for column in measured_columns], most)
         line = end - len(made_of) if above else start
         if made_of and keep[line : line + len(made_of)].all():
             keep[line : line + len(made_of)] = False
@@ -258,19 +260,19 @@ def drop_totals(
     return {index: column[keep] if column.size == keep.size else column for index, column in columns.items()}, table
 
 
-def _levels(columns: Sequence[NDArray[Any]]) -> list[tuple[int, int, bool]]:
+def _levels(columns: Sequence[NDArray[Any]]) -> list[tuple[int, int]]:
     """Where the rows begin and end in which a column stays as it is: levels of a test, which may have a mean each."""
     found = []
-    for column in columns:
+    for column in columns if columns[0].size <= _LONGEST_OF_LEVELS else ():
         ends = [0, *(np.flatnonzero(np.diff(plain(column)) != 0) + 1), column.size]
         if 1 < len(ends) - 1 <= column.size / _SHORTEST_LEVEL:
-            found += [(start, end, True) for start, end in pairwise(map(int, ends)) if end - start >= _SHORTEST_LEVEL]
+            found += [(start, end) for start, end in pairwise(map(int, ends)) if end - start >= _SHORTEST_LEVEL]
     return found
 
 
-def _totals(columns: list[FloatArray]) -> list[str]:
-    """What the last rows of columns [n] are made of, a word for each; empty where they may be measured."""
-    for count in range(min(_MAX_TOTALS, columns[0].size - 3), 0, -1):
+def _totals(columns: list[FloatArray], most: int = _MAX_TOTALS) -> list[str]:
+    """What the last rows of columns [n], `most` at most, are made of, a word for each; empty where they may be measured."""
+    for count in range(min(most, columns[0].size - 3), 0, -1):
         above = [column[:-count] for column in columns]
         made_of, by_chance = [], 1.0
         for row in range(-count, 0):
