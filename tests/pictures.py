@@ -46,7 +46,7 @@ def dashboard() -> None:
             turned(page, "diagnosis").locator("#diagnosis").get_by_role("button", name="Run the diagnosis").click()
             page.locator("#diagnosis .verdict").wait_for(timeout=600_000)
             _section(page, "diagnosis", "diagnosis", height=1240)
-            _section(page, "curves", "stribeck", height=720)
+            _section(page, "curves", "stribeck", height=1060)
         with _page(browser, 1280, 900, scheme="dark") as page:
             page.goto(f"{server.url}/clutches/sim-2")
             drawn(page)

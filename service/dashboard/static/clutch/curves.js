@@ -32,7 +32,7 @@ const NAMES = optionsOf(PARAMETERS);
 /** @type {(page: Page) => Tab} */
 export function curvesTab({ reader }) {
   const { name } = reader;
-  const curves = new Chart({ name, id: "stribeck", title: "Stribeck curves", height: 440 });
+  const curves = new Chart({ name, id: "stribeck", title: "Stribeck curves", wide: true, height: 400 });
   const spatial = new Chart({ name, id: "surface", title: "Lines of equal torque", wide: true, height: 400 });
   const parameters = PARAMETER_NAMES.map((key) => {
     const { title, symbol: letter } = PARAMETERS[key];
