@@ -123,7 +123,7 @@ _OWN: dict[str, Any] = {
     "Change.after": {"cycles": 7000}, "Change.before": {"cycles": 70000}, "ModelName.name": "baseline",
     "Problem.status": 422, "Problem.title": "The content is not valid", "ProblemError.code": "not_finite",
     "ProblemError.value": "nan", "Axes.cycles": [0, 1000, 2000],
-    "CandidateOut.isolability": 0.9, "like_the_law": ["viscous_exponent"], "rms_percent": 3.1,
+    "CandidateOut.isolability": 0.9, "VisibleOut.isolability": 0.8, "like_the_law": ["viscous_exponent"], "rms_percent": 3.1,
     "interval_percent": [2.2, 4.0], "effect_on_mean_cof_percent": -0.4, "effect_on_remaining_cycles_percent": -2.5,
     "from_rpm": 20, "to_rpm": 120, "LawBandOut.share": 0.7, "eq3_nm": [21.2, 22.6, 22.4, 21.6, 20.7],
     "law_nm": [21.8, 22.8, 22.4, 21.5, 20.8], "law_sd_nm": [0.1, 0.08, 0.06, 0.06, 0.07],

@@ -8,8 +8,10 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import PurePath
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from models.arrays import FloatArray
 from service.channels import CHANNELS
@@ -231,11 +233,6 @@ def _settled(
     rivals = [at for at in rivals if table.columns[at].unit is not None] or rivals
     if len(rivals) < 2:
         return (rivals[0], best) if rivals else (None, 1.0)
-    own = {at: _converted(table, at, channel, reading) for at in rivals}
-    first, *others = own.values()
-    scale = float(np.nanmax(np.abs(first), initial=0.0))
-    if all(np.allclose(first, other, rtol=0, atol=_SAME * scale, equal_nan=True) for other in others):
-        return next((at for at in rivals if table.columns[at].unit == CHANNELS[channel].unit), rivals[0]), best
     torque = next(
         (
             at
@@ -244,19 +241,27 @@ def _settled(
         ),
         None,
     )
+    # read together: the last row may be cut in one of them
+    asked = dict.fromkeys(rivals, channel) | ({} if torque is None else {torque: "torque_nm"})
+    cells = read_cells(table, asked, reading)
+    own = {at: _converted(cells[at], table.columns[at], channel) for at in rivals}
+    first, *others = own.values()
+    scale = float(np.nanmax(np.abs(first), initial=0.0))
+    if all(np.allclose(first, other, rtol=0, atol=_SAME * scale, equal_nan=True) for other in others):
+        return next((at for at in rivals if table.columns[at].unit == CHANNELS[channel].unit), rivals[0]), best
     if channel != "pressure_bar" or torque is None:
         return None, 1.0
-    torques = np.abs(_converted(table, torque, "torque_nm", reading))
+    torques = np.abs(_converted(cells[torque], table.columns[torque], "torque_nm"))
     follows = {at: _correlation(values, torques) for at, values in own.items()}
     chosen, *rest = sorted(follows, key=lambda at: follows[at], reverse=True)
     clear = follows[chosen] > _FOLLOWS and all(follows[at] < _FOLLOWS - 0.3 for at in rest)
     return (chosen, _WITH_RIVAL * best) if clear else (None, 1.0)
 
 
-def _converted(table: Table, at: int, channel: str, reading: Reading) -> FloatArray:
+def _converted(cells: NDArray[Any], column: FileColumn, channel: str) -> FloatArray:
     """A column's values [n] in the channel's unit, as far as it states one."""
-    values = plain(read_cells(table, {at: channel}, reading)[at])
-    converted = conversion(channel, table.columns[at].unit or "")
+    values = plain(cells)
+    converted = conversion(channel, column.unit or "")
     if converted is not None:
         converted.apply(values)
     return values

@@ -8,15 +8,15 @@ from typing import Any
 import numpy as np
 
 from tests.blind.rig.makers import CATALOGUED, HISTORY, LAWS, OUTSIDE
-from tests.blind.trials import Outcome, Trial, trial
+from tests.blind.trials import RECORDS, Outcome, Trial, trial
 from tests.measuring import Asked
 
 Test = Callable[[Outcome], bool]
 LOUDNESSES = (20.0, 50.0, 80.0, 300.0)
 #: Noise of the sensor, in percent of the torque.
 NOISES = (1.0, 0.3, 0.1)
-#: Effects that only loops show, and those that only raw records do.
-LOOPS, RECORDS = {"channel_delay", "inertia_torque", "squeeze_film"}, {"shaft_ripple", "stick_slip"}
+#: Effects that only loops show.
+LOOPS = {"channel_delay", "inertia_torque", "squeeze_film"}
 #: So many advised tests are made one after the other, each chosen by the report before it.
 MOST_ADVISED = 3
 #: Whose error beyond noise an extension has to halve.
