@@ -289,6 +289,17 @@ def test_warnings_of_a_life_stand_on_its_page(watched: Watched, server: Server) 
     expect(opened_run.locator("summary").first).to_be_focused()
 
 
+def test_a_menu_that_is_open_when_a_run_arrives_stays_open(watched: Watched, server: Server) -> None:
+    page = opened(watched)
+    page.get_by_text("More", exact=True).click()
+    archive = page.get_by_role("button", name="Archive …")
+    archive.focus()
+    before = archive.element_handle()
+    post(server.http, "bench", right(LAST))
+    before.wait_for_element_state("hidden", timeout=60_000)  # it is drawn again
+    expect(archive).to_be_focused()
+
+
 @pytest.mark.slow
 def test_runs_are_listed_page_by_page_the_latest_first(watched: Watched, server: Server) -> None:
     for cycles in range(6010, 6330, 10):

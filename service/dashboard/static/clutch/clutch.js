@@ -8,7 +8,7 @@ import { pollRaised } from "../alarms/raised.js";
 import { engagementsTab } from "../engagements/engagements.js";
 import { sender } from "../sending/taking.js";
 import { at, Problem, read } from "../shared/api.js";
-import { button, byId, h, markShown, showTab } from "../shared/dom.js";
+import { button, byId, h, markShown, redraw, showTab } from "../shared/dom.js";
 import { Live } from "../shared/live.js";
 import { placeUnits } from "../shared/units.js";
 import { askArchive, askEnd, askTakeBack, showDone } from "./changes.js";
@@ -125,7 +125,7 @@ function drawHead(clutch) {
     copy,
     refresh,
   };
-  byId("head").replaceChildren(...head(clutch, asks));
+  redraw(byId("head"), ...head(clutch, asks));
   markShown("head-shown");
   const back = button("Bring it back …", () => done(askArchive(ID, false)));
   const text = "This clutch is archived: it is not in the list of clutches and accepts no new runs.";

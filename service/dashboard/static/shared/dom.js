@@ -185,6 +185,21 @@ export function menu(label, entries) {
 }
 
 /**
+ * Draw a place again, a menu that is open in it too: it stays open, the focus on the entry of the same name.
+ * @type {(place: HTMLElement, ...content: Node[]) => void}
+ */
+export function redraw(place, ...content) {
+  const open = place.querySelector("details.menu[open]");
+  const focused = open?.contains(document.activeElement) ? document.activeElement?.textContent : null;
+  place.replaceChildren(...content);
+  const menu = open && place.querySelector("details.menu");
+  if (!menu) return;
+  menu.setAttribute("open", "");
+  const entries = /** @type {HTMLElement[]} */ ([...menu.querySelectorAll("summary, button")]);
+  entries.find((entry) => entry.textContent === focused)?.focus();
+}
+
+/**
  * Show a dialog; `result` of it once it is closed.
  * @template Result
  * @param {HTMLDialogElement} dialog
