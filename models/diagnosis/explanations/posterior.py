@@ -462,7 +462,7 @@ class Search:
         single = self.prior(Alternative(("",)))
         swings = {record.effect: record.log_evidence for record in raw if is_vibration(record)}
         isolabilities = self._isolabilities()
-        merged, like_the_law = self._isolable(weights, isolabilities)
+        merged, like_the_law = isolable(weights, isolabilities)
         return Posterior(
             weights={alternative: weight - null.log_evidence for alternative, weight in merged.items()},
             nodes={alternative: nodes[0] for alternative, nodes in self.nodes.items()},
@@ -498,30 +498,34 @@ class Search:
         shares = isolability(self._null_problem, self.null.fit, self._changes[:, places], sizes)
         return dict(zip(best, np.clip(shares, 0.0, 1.0).tolist(), strict=True))
 
-    def _isolable(
-        self, weights: Mapping[Alternative, float], isolabilities: Mapping[Alternative, Mapping[str, float]]
-    ) -> tuple[dict[Alternative, float], dict[str, float]]:
-        """The weights where a cause of which less than ISOLABLE is left beside the law's discrepancy is the law's: its
-        explanation counts as the same without it, the least isolable first, and what is then left by its own ι. And the
-        probability of each such cause. An explanation that was not refitted has the ι of its causes alone."""
-        total = log_sum(list(weights.values()))
-        merged: dict[Alternative, float] = {}
-        like_the_law: dict[str, float] = {}
-        for alternative, weight in weights.items():
-            left = alternative
-            while left.named:
-                refitted = isolabilities.get(left)
-                shares = [
-                    ((refitted or isolabilities.get(NOTHING.and_effect(slug) or NOTHING, {})).get(slug, 1.0), slug)
-                    for slug in left.named
-                ]
-                share, least = min(shares)
-                if share >= criteria.ISOLABLE:
-                    break
-                left = left.without(least)
-                like_the_law[least] = like_the_law.get(least, 0.0) + float(np.exp(weight - total))
-            merged[left] = float(np.logaddexp(merged.get(left, -np.inf), weight))
-        return merged, like_the_law
+
+def isolable(
+    weights: Mapping[Alternative, float], isolabilities: Mapping[Alternative, Mapping[str, float]]
+) -> tuple[dict[Alternative, float], dict[str, float]]:
+    """Log weights of the explanations [nats] whose causes can all be told from the law's form, and by cause the probability
+    that was counted as the law's.
+
+    A cause of which less than ISOLABLE is left beside the law's discrepancy is the law's: its explanation counts as the same
+    without it, the least isolable first, and what is then left by its own ι (`isolabilities`, by explanation and slug). An
+    explanation that was not refitted has the ι of its causes alone."""
+    total = log_sum(list(weights.values()))
+    merged: dict[Alternative, float] = {}
+    like_the_law: dict[str, float] = {}
+    for alternative, weight in weights.items():
+        left = alternative
+        while left.named:
+            refitted = isolabilities.get(left)
+            shares = [
+                ((refitted or isolabilities.get(NOTHING.and_effect(slug) or NOTHING, {})).get(slug, 1.0), slug)
+                for slug in left.named
+            ]
+            share, least = min(shares)
+            if share >= criteria.ISOLABLE:
+                break
+            left = left.without(least)
+            like_the_law[least] = like_the_law.get(least, 0.0) + float(np.exp(weight - total))
+        merged[left] = float(np.logaddexp(merged.get(left, -np.inf), weight))
+    return merged, like_the_law
 
 
 def _shown(problem: FitProblem, fitted: PooledFit, columns: Sequence[Column]) -> tuple[list[Column], FloatArray]:

@@ -324,6 +324,8 @@ def test_a_cause_like_the_law_is_said_as_such_and_never_named() -> None:
     assert found.like_the_law == ("unsettled_dwell",)
     assert "cannot tell an unsettled dwell from the form of the friction curve" in found.summary
     assert "held twice as long" in found.summary
+    shown = {visible.effect: visible.isolability for visible in found.visible}
+    assert shown["unsettled_dwell"] < criteria.ISOLABLE < shown["accelerated_wear"]
     told = posterior_of(study(rising).baseline, ())
     assert told.isolability["unsettled_dwell"] < criteria.ISOLABLE
     assert told.like_the_law["unsettled_dwell"] > 0.5

@@ -10,7 +10,7 @@ from models.diagnosis.campaign import Campaign, EventKind, MaintenanceEvent, Sta
 from models.diagnosis.criteria import ANYTHING_WRONG, ISOLABLE, SURE
 from models.diagnosis.effects.fitted_effect import AmplitudeEstimate
 from models.diagnosis.explanations.decide import decide, explanations_of
-from models.diagnosis.explanations.posterior import Prior, Search, posterior_of
+from models.diagnosis.explanations.posterior import Prior, Search, isolable, posterior_of
 from models.diagnosis.explanations.shapeless import outlying_run, temperature_evidence
 from models.diagnosis.explanations.verdict import NOTHING, UNCATALOGUED, Alternative, Explanation, Verdict
 from models.diagnosis.pooled_fit.baseline_fit import Baseline
@@ -240,6 +240,22 @@ def test_an_unmeasured_temperature_competes_under_the_scatter_of_gains_that_noth
     hidden = hide((404, 3894774685, 2), ("rest_recovery",), 300.0, loops=True)
     found = posterior_of(study(sent(hidden)).baseline, ())
     assert found.weights[Alternative(("rest_recovery",))] > found.weights[Alternative(("oil_temperature",))] + 20.0
+
+
+def test_the_least_isolable_cause_goes_first_and_the_other_is_judged_by_what_it_is_alone() -> None:
+    drag, heating, both = Alternative(("drag",)), Alternative(("heating",)), Alternative(("drag", "heating"))
+    isolabilities = {
+        NOTHING: {},
+        drag: {"drag": 0.9},
+        heating: {"heating": 0.3},
+        both: {"drag": 0.4, "heating": 0.2},  # beside each other neither can be told from the law's form
+    }
+    weights = {NOTHING: 0.0, drag: 0.0, heating: 0.0, both: 0.0}
+    merged, like_the_law = isolable(weights, isolabilities)
+    assert merged == {NOTHING: pytest.approx(np.log(2.0)), drag: pytest.approx(np.log(2.0))}
+    assert like_the_law == {"heating": pytest.approx(0.5)}
+    unfitted = Alternative(("drag", "unseen"))
+    assert isolable({unfitted: 0.0}, isolabilities) == ({unfitted: 0.0}, {})  # each by its ι alone
 
 
 def test_what_was_not_refitted_counts_as_its_likeliest_parent_promises() -> None:

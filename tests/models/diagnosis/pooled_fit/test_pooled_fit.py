@@ -34,6 +34,10 @@ def test_a_fit_says_how_it_ended(given: Study) -> None:
     assert cut.status is FitStatus.OUT_OF_STEPS
     assert cut.cost > ended.cost + 1.0
     assert fit(given.problem, start_of(given.design), steps=0).status is FitStatus.OUT_OF_STEPS
+    # a fit that cannot come near a stated cost is broken off
+    hopeless = fit(given.problem, start_of(given.design), steps=60, reach=-1e9)
+    assert (hopeless.status, hopeless.cost > ended.cost) == (FitStatus.OUT_OF_STEPS, True)
+    assert fit(given.problem, start_of(given.design), steps=60, reach=ended.cost + 1.0).cost == ended.cost
     # from its own end a fit makes no way
     again = fit(given.problem, ended.laws)
     assert again.status in {FitStatus.CONVERGED, FitStatus.STALLED}
