@@ -13,7 +13,7 @@ from service.api.diagnosis import DiagnosisListed, DiagnosisOut, DiagnosisPage, 
 from service.api.life import ModelName
 from service.channels import whole
 from service.clutch.assumptions import BASELINE
-from service.clutch.diagnosis.report import empty
+from service.clutch.diagnosis.report import EMPTY
 from service.clutch.model_correction import extension_of
 from service.paging import Part, by_key
 from service.tables import Cells
@@ -91,7 +91,7 @@ def _items(connection: Connection, clutch_id: str, rows: list[DiagnosisRow], sha
             "adoptable": row.extension is not None and row.life == life,
             "adopted": row.diagnosis_id == in_force,
         }
-        fields = {name: getattr(row, name) for name in _OF_ROW} | own | empty() | (row.report or {})
+        fields = {name: getattr(row, name) for name in _OF_ROW} | own | dict(EMPTY) | (row.report or {})
         items.append(shape(**{name: value for name, value in fields.items() if name in shape.model_fields}))
     return items
 

@@ -290,24 +290,9 @@ class LoopTraceOut(base.Answer):
     extended_nm: Numbers = Field(description="Torque under the extended model, Nm")
 
 
-class DiagnosisListed(base.Answer):
-    """A diagnosis without its maps and loops. It has no verdict while it runs, or if it failed."""
+class ReportSummary(base.Answer):
+    """What a diagnosis found, as lists show it."""
 
-    diagnosis_id: DiagnosisName
-    clutch_id: base.ClutchName
-    status: Literal["running", "finished", "failed"] = Field(
-        description="Whether it still runs, has finished, or failed"
-    )
-    created_at: str = Field(description="When it was requested; UTC, ISO 8601")
-    finished_at: str | None = Field(description="When it ended; UTC, ISO 8601")
-    revision: base.Revision
-    as_of_cycles: Number = Field(description="Duty cycles since new of the latest run in it")
-    stale: bool = Field(description="Whether runs were posted since")
-    earlier_life: bool = Field(description="Whether a rebuild has ended the life that it diagnosed")
-    adoptable: bool = Field(description="Whether it has an extended model to adopt")
-    adopted: bool = Field(description="Whether its model is the current one")
-    problem: str | None = Field(description="Why it failed")
-    code_version: str = Field(description="The release that computed it")
     verdict: base.VerdictName | None = Field(description="The verdict")
     causes: list[str] = Field(
         description="Slugs of the named causes, or of those that these data cannot distinguish; `uncatalogued`: "
@@ -339,8 +324,8 @@ class DiagnosisListed(base.Answer):
     statistics: dict[str, Number] = Field(description="Numbers of the computation, by name")
 
 
-class DiagnosisOut(DiagnosisListed):
-    """A diagnosis with its residual maps and loops."""
+class ReportParts(base.Answer):
+    """What only the diagnosis itself shows of its report."""
 
     maps: MapsOut | None = Field(description="Residual maps; null without a verdict")
     loops: list[LoopTraceOut] = Field(description="Measured friction loops beside both models'")
@@ -350,6 +335,38 @@ class DiagnosisOut(DiagnosisListed):
     isolability: IsolabilityOut | None = Field(
         default=None, description="Which causes these tests could distinguish; null if not requested"
     )
+
+
+class ReportOut(ReportParts, ReportSummary):
+    """The report of a diagnosis; stored as JSON when it ends."""
+
+
+class DiagnosisHead(base.Answer):
+    """What a row says of a diagnosis."""
+
+    diagnosis_id: DiagnosisName
+    clutch_id: base.ClutchName
+    status: Literal["running", "finished", "failed"] = Field(
+        description="Whether it still runs, has finished, or failed"
+    )
+    created_at: str = Field(description="When it was requested; UTC, ISO 8601")
+    finished_at: str | None = Field(description="When it ended; UTC, ISO 8601")
+    revision: base.Revision
+    as_of_cycles: Number = Field(description="Duty cycles since new of the latest run in it")
+    stale: bool = Field(description="Whether runs were posted since")
+    earlier_life: bool = Field(description="Whether a rebuild has ended the life that it diagnosed")
+    adoptable: bool = Field(description="Whether it has an extended model to adopt")
+    adopted: bool = Field(description="Whether its model is the current one")
+    problem: str | None = Field(description="Why it failed")
+    code_version: str = Field(description="The release that computed it")
+
+
+class DiagnosisListed(ReportSummary, DiagnosisHead):
+    """A diagnosis without its maps and loops. It has no verdict while it runs, or if it failed."""
+
+
+class DiagnosisOut(ReportParts, DiagnosisListed):
+    """A diagnosis with its residual maps and loops."""
 
 
 class DiagnosisPage(base.Page[DiagnosisListed]):

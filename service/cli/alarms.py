@@ -1,11 +1,12 @@
 """`clutchlife alarms`: what rules have raised, and that somebody has seen it."""
 
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
 from service.cli.options import Json, asking, listed, print_line
 from service.cli.tables import show_table
+from service.client.clutchlife.answers import JsonObject
 from service.client.clutchlife.transport import Service
 
 
@@ -32,16 +33,16 @@ def alarms(
         listed(service.pages("/v1/alarms/events", **options), as_json, _show_events, "no alarm is raised")
 
 
-def _show_events(items: list[dict[str, Any]]) -> None:
+def _show_events(items: list[JsonObject]) -> None:
     for item in items:
         print_line(f"{item['event_id']}  {item['state']:<12}  since {item['raised_at'][:19]}  {item['message']}")
 
 
-def _show_rules(items: list[dict[str, Any]]) -> None:
+def _show_rules(items: list[JsonObject]) -> None:
     show_table(("rule", "of", "quantity", "limit"), map(_rule, items))
 
 
-def _rule(item: dict[str, Any]) -> list[str]:
+def _rule(item: JsonObject) -> list[str]:
     limit = next((f"{side} {item[side]:g}" for side in ("below", "above") if item[side] is not None), "")
     whose = item["clutch_id"] or item["kind"] or "all"
     return [item["name"] or item["alarm_id"], str(whose), item["quantity"], limit]

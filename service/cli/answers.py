@@ -11,6 +11,7 @@ import typer
 
 from service.cli.options import EX_USAGE, ClutchId, Json, asking, fail, out, print_line
 from service.cli.tables import chance, coefficient, cycles, model_name, number, show_table, warn, with_deviation
+from service.client.clutchlife.answers import JsonObject
 from service.client.clutchlife.transport import Service
 
 Method = Annotated[str | None, typer.Option(help="The filter: particle, ukf or grid")]
@@ -26,7 +27,7 @@ Arguments = Annotated[
 Csv = Annotated[bool, typer.Option("--csv", help="Print the answer as CSV")]
 
 
-def _arguments(given: list[str] | None, **named: Any) -> dict[str, Any]:
+def _arguments(given: list[str] | None, **named: Any) -> JsonObject:
     """The route's arguments: those with an option of their own, where they are given, and those of `--query`."""
     arguments = {name: value for name, value in named.items() if value is not None}
     for assignment in given or []:
@@ -41,7 +42,7 @@ def _answer(
     service: Service,
     address: str,
     arguments: Mapping[str, Any],
-    show: Callable[[dict[str, Any]], object],
+    show: Callable[[JsonObject], object],
     *,
     as_json: bool,
     as_csv: bool = False,
@@ -205,7 +206,7 @@ def _quantiles(answer: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, An
         yield name, answer["end_of_life_at"], lambda date: "-" if date is None else date[:10]
 
 
-def _programme(plan: Path | None, blocks: list[str], pace: float | None) -> dict[str, Any]:
+def _programme(plan: Path | None, blocks: list[str], pace: float | None) -> JsonObject:
     """The request body; what is wrong with its content the service says. A pace that is given replaces the file's."""
     if plan is not None and blocks:
         fail("use --plan or --block, not both", EX_USAGE)

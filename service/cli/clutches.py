@@ -5,13 +5,14 @@ import math
 import time
 from datetime import datetime
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
 from service.cli import options
 from service.cli.tables import cycles, model_name, show_table
 from service.client.clutchlife import Client, ClutchlifeError
+from service.client.clutchlife.answers import JsonObject
 from service.client.clutchlife.transport import Service
 
 #: What `status` ends with, as plugins of monitoring programs do: all is well, a warning, critical, unknown.
@@ -36,7 +37,7 @@ def register(
     ] = None,
 ) -> None:
     """Register a clutch, so that you can send its runs. Fields that you omit have the values of the reference paper."""
-    fields: dict[str, Any] = {} if record is None else json.loads(record.read_bytes())
+    fields: JsonObject = {} if record is None else json.loads(record.read_bytes())
     if not isinstance(fields, dict):
         raise ValueError(f"{record} must hold a JSON object")  # noqa: TRY004  (a wrong file, not a wrong call)
     for assignment in set_fields or ():
@@ -63,7 +64,7 @@ def list_clutches(
     options.listed(items, as_json, lambda items: show_table(columns, map(_row, items)), nothing)
 
 
-def _row(item: dict[str, Any]) -> list[str]:
+def _row(item: JsonObject) -> list[str]:
     held_count = str(item["held"]) if item["held"] else ""
     summary, numbers = item["summary"], ["-", "-", "-"]
     if summary:
@@ -121,7 +122,7 @@ def watch(
         before, count = headline, count + 1
 
 
-def _headline(item: dict[str, Any]) -> str:
+def _headline(item: JsonObject) -> str:
     return f"{item['clutch_id']}: {item['headline']}"
 
 
@@ -140,7 +141,7 @@ def edit(
     """Change fields of a clutch's record; all results are computed again."""
     address = f"/v1/clutches/{clutch}"
     record = service.get(address)
-    fields: dict[str, Any] = {}
+    fields: JsonObject = {}
     for assignment in set_fields:
         _assign(fields, record, assignment)
     changed = service.patch(address, fields | {"reason": reason})
@@ -160,7 +161,7 @@ def archive(
     options.print_line(f"{clutch} is {'archived' if changed['archived'] else 'in use'}")
 
 
-def _assign(fields: dict[str, Any], record: dict[str, Any], assignment: str) -> None:
+def _assign(fields: JsonObject, record: JsonObject, assignment: str) -> None:
     """Put `geometry.friction_faces=4` into the field that is sent, whose other parts stay as they are in the record."""
     name, equals, text = assignment.partition("=")
     field, dot, part = name.strip().partition(".")

@@ -14,14 +14,14 @@ import tempfile
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
-from typing import Annotated, Any, get_args
+from typing import Annotated, get_args
 
 import typer
 from rich.progress import Progress
 
 from service.cli.options import ClutchId, asking, err, print_line
 from service.cli.workbook import write_workbook
-from service.client.clutchlife.answers import RefusedError
+from service.client.clutchlife.answers import JsonObject, RefusedError
 from service.client.clutchlife.transport import Service
 from service.runs import manifest
 
@@ -114,7 +114,7 @@ def _parquet_can_be_written() -> bool:
     return importlib.util.find_spec("pyarrow") is not None  # an extra
 
 
-def _description(service: Service, clutch: dict[str, Any], record: dict[str, Any]) -> dict[str, Any]:
+def _description(service: Service, clutch: JsonObject, record: JsonObject) -> JsonObject:
     """What an export is of: the release, the settings of the clutch, and the data by their hashes."""
     runs = service.pages(f"/v1/clutches/{clutch['clutch_id']}/runs")
     return {
@@ -128,7 +128,7 @@ def _description(service: Service, clutch: dict[str, Any], record: dict[str, Any
     }
 
 
-def _as_sent(run: dict[str, Any]) -> dict[str, Any]:
+def _as_sent(run: JsonObject) -> JsonObject:
     return {name: run[name] for name in _SENT if run[name] is not None and run[name] != {}}
 
 

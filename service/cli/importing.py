@@ -1,14 +1,14 @@
 """`clutchlife import`: a rig's file as it would be read, asked about where that is open, sent, and kept as a rig profile."""
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 from rich.table import Table
 
 from service.cli.options import EX_DATAERR, ChannelMap, Decimal, Good, Missing, asking, fail, out, print_line
 from service.cli.runs import run_line
-from service.client.clutchlife.answers import suggested
+from service.client.clutchlife.answers import JsonObject, suggested
 from service.client.clutchlife.transport import Service
 
 _KINDS = ("stationary_stribeck", "dynamic_stribeck")
@@ -42,8 +42,8 @@ def import_file(
     For the next file of the rig use `clutchlife push --rig NAME`, or import again.
     """
     reading = {"map": channel_map, "decimal": decimal, "missing": missing, "good": good}
-    options: dict[str, Any] = {"kind": kind, "cycles": cycles, "rig": rig} | reading
-    profile: dict[str, Any] | None = None
+    options: JsonObject = {"kind": kind, "cycles": cycles, "rig": rig} | reading
+    profile: JsonObject | None = None
     while True:
         shown = _sent(service, "/v1/import/preview", file, options | {"clutch_id": clutch}, profile)
         _show(shown)
@@ -74,7 +74,7 @@ def import_file(
     print_line(run_line(receipt) + ("  stored before" if receipt["duplicate"] else ""))
 
 
-def _question(shown: dict[str, Any], clutch: str) -> str:
+def _question(shown: JsonObject, clutch: str) -> str:
     """What is asked before a file is sent."""
     if shown["suggestion"] is None:
         return f"Send it to {clutch}?"
@@ -82,9 +82,7 @@ def _question(shown: dict[str, Any], clutch: str) -> str:
     return f"These columns are suggested, not certain ({sure}). Are they right? Send it to {clutch}?"
 
 
-def _sent(
-    service: Service, path: str, file: Path, given: dict[str, Any], profile: dict[str, Any] | None
-) -> dict[str, Any]:
+def _sent(service: Service, path: str, file: Path, given: JsonObject, profile: JsonObject | None) -> JsonObject:
     """The answer to the file, read by a profile that is not saved, or by a saved one or none."""
     parameters = {name: str(value) for name, value in given.items() if value is not None} | {"filename": file.name}
     if profile is None:
@@ -94,7 +92,7 @@ def _sent(
     return service.post_form(path, file, profile, parameters)
 
 
-def _show(shown: dict[str, Any]) -> None:
+def _show(shown: JsonObject) -> None:
     """The preview: a row a column of the file, then what is cut and fitted."""
     title = None if shown["rig"] is None else f"read by the rig profile {shown['rig']}"
     grid = Table(title=title, title_justify="left")
@@ -120,7 +118,7 @@ def _show(shown: dict[str, Any]) -> None:
         out.print(f"  {fit['pressure_bar']:g} bar: {points}", markup=False)
 
 
-def _answered(shown: dict[str, Any], given: dict[str, Any], profile: dict[str, Any] | None) -> dict[str, Any] | None:
+def _answered(shown: JsonObject, given: JsonObject, profile: JsonObject | None) -> JsonObject | None:
     """Ask for each thing that is missing; the profile with the answers, `given` changed in place."""
     columns = [dict(column) for column in shown["profile"]["columns"]]
     edited = False
@@ -151,7 +149,7 @@ def _choice(question: str, values: list[str]) -> str:
             return values[number - 1]
 
 
-def _save(service: Service, name: str, shown: dict[str, Any]) -> None:
+def _save(service: Service, name: str, shown: JsonObject) -> None:
     """Keep how the file was read under a name."""
     body = shown["profile"] | {"name": name, "kind": shown["profile"]["kind"] or shown["kind"]}
     service.post("/v1/rigs", body)

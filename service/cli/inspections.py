@@ -9,6 +9,7 @@ import typer
 
 from service.cli.options import EX_USAGE, ClutchId, Json, asking, fail, listed, print_line
 from service.cli.tables import number, show_table
+from service.client.clutchlife.answers import JsonObject
 from service.client.clutchlife.transport import Service
 
 #: The media type of a photograph by its file's suffix.
@@ -64,7 +65,7 @@ def _media_type(path: Path) -> str:
     return MEDIA_TYPES[path.suffix.lower()]
 
 
-def _show(items: list[dict[str, Any]]) -> None:
+def _show(items: list[JsonObject]) -> None:
     show_table(_COLUMNS, map(_row, items), left=3)
 
 

@@ -12,7 +12,7 @@ from typing import Any
 from urllib.parse import quote
 
 from service.cli.options import asking
-from service.client.clutchlife.answers import ClutchlifeError
+from service.client.clutchlife.answers import ClutchlifeError, JsonObject
 from service.client.clutchlife.transport import Service
 
 #: Versions of the protocol that are understood, the newest first.
@@ -24,7 +24,7 @@ _FEW = 20
 
 _TEXT, _NUMBER = {"type": "string"}, {"type": "number"}
 _COUNT = {"type": "integer", "minimum": 1, "maximum": 1000, "default": _FEW}
-_LISTED: dict[str, dict[str, Any]] = {"limit": _COUNT, "cursor": _TEXT}
+_LISTED: dict[str, JsonObject] = {"limit": _COUNT, "cursor": _TEXT}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,7 +41,7 @@ class Tool:
         """The names in the path."""
         return [part.partition("}")[0] for part in self.path.split("{")[1:]]
 
-    def described(self) -> dict[str, Any]:
+    def described(self) -> JsonObject:
         """The tool as `tools/list` names it."""
         return {
             "name": self.name,
@@ -55,7 +55,7 @@ class Tool:
             "annotations": {"readOnlyHint": True, "openWorldHint": False},
         }
 
-    def asked(self, service: Service, arguments: Mapping[str, Any]) -> dict[str, Any]:
+    def asked(self, service: Service, arguments: Mapping[str, Any]) -> JsonObject:
         """The service's answer. Raises ValueError on wrong arguments, ClutchlifeError as the client does."""
         unknown = arguments.keys() - {*self.required, *self.optional}
         missing = [name for name in self.required if not arguments.get(name)]
@@ -146,7 +146,7 @@ def mcp(service: Service) -> None:
             print(json.dumps(reply, ensure_ascii=False), flush=True)  # noqa: T201  (the protocol, not a terminal)
 
 
-def answered(service: Service, line: str) -> dict[str, Any] | None:
+def answered(service: Service, line: str) -> JsonObject | None:
     """The answer to a message; None where it is a notification."""
     try:
         message = json.loads(line)
@@ -157,11 +157,11 @@ def answered(service: Service, line: str) -> dict[str, Any] | None:
     if "id" not in message:
         return None
     name, parameters = message["id"], message.get("params")
-    given: dict[str, Any] = parameters if isinstance(parameters, dict) else {}
+    given: JsonObject = parameters if isinstance(parameters, dict) else {}
     match message["method"]:
         case "initialize":
             asked = given.get("protocolVersion")
-            result: dict[str, Any] = {
+            result: JsonObject = {
                 "protocolVersion": asked if asked in VERSIONS else VERSIONS[0],
                 "capabilities": {"tools": {}},
                 "serverInfo": {"name": "clutchlife", "version": version("clutchlife")},
@@ -182,7 +182,7 @@ def answered(service: Service, line: str) -> dict[str, Any] | None:
     return {"jsonrpc": "2.0", "id": name, "result": result}
 
 
-def _called(service: Service, tool: Tool, arguments: Mapping[str, Any]) -> dict[str, Any]:
+def _called(service: Service, tool: Tool, arguments: Mapping[str, Any]) -> JsonObject:
     """The result of a call; what the service refuses, or that it is away, is said to the caller."""
     try:
         answer = tool.asked(service, arguments)
@@ -192,5 +192,5 @@ def _called(service: Service, tool: Tool, arguments: Mapping[str, Any]) -> dict[
     return {"content": [{"type": "text", "text": text}], "structuredContent": answer, "isError": False}
 
 
-def _failed(name: Any, code: int, message: str) -> dict[str, Any]:
+def _failed(name: Any, code: int, message: str) -> JsonObject:
     return {"jsonrpc": "2.0", "id": name, "error": {"code": code, "message": message}}

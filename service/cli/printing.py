@@ -17,6 +17,8 @@ from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
+from service.client.clutchlife.answers import JsonObject
+
 if TYPE_CHECKING:
     import httpx2
 
@@ -78,7 +80,7 @@ class _Browser:
     def __init__(self, asked: BinaryIO, answers: BinaryIO) -> None:
         self._asked, self._answers, self._numbers = asked, answers, count(1)
 
-    def ask(self, method: str, session: str | None = None, **parameters: Any) -> dict[str, Any]:
+    def ask(self, method: str, session: str | None = None, **parameters: Any) -> JsonObject:
         number = next(self._numbers)
         message = {"id": number, "method": method, "params": parameters}
         if session is not None:
@@ -91,16 +93,16 @@ class _Browser:
                 continue
             if "error" in answer:
                 raise ReportError(f"the browser refused {method}: {answer['error'].get('message')}")
-            found: dict[str, Any] = answer["result"]
+            found: JsonObject = answer["result"]
             return found
 
-    def _next(self) -> dict[str, Any]:
+    def _next(self) -> JsonObject:
         read = bytearray()
         while (byte := self._answers.read(1)) != b"\0":
             if not byte:
                 raise ReportError("the browser ended unexpectedly")
             read += byte
-        found: dict[str, Any] = json.loads(read)
+        found: JsonObject = json.loads(read)
         return found
 
 
@@ -116,7 +118,7 @@ class _Page:
         if authorization is not None:
             self.ask("Network.setExtraHTTPHeaders", headers={"Authorization": authorization})
 
-    def ask(self, method: str, **parameters: Any) -> dict[str, Any]:
+    def ask(self, method: str, **parameters: Any) -> JsonObject:
         return self._browser.ask(method, self._session, **parameters)
 
     def wait(self, length: str, address: str) -> None:

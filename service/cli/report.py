@@ -11,7 +11,7 @@ import typer
 from service.cli import printing
 from service.cli.options import asking, err, print_line
 from service.cli.workbook import write_workbook
-from service.client.clutchlife.answers import RefusedError, ServiceAwayError
+from service.client.clutchlife.answers import JsonObject, RefusedError, ServiceAwayError
 from service.client.clutchlife.transport import Service
 
 _CLUTCHES = (
@@ -83,7 +83,7 @@ def _written(service: Service, names: Sequence[str], folder: Path, *, pdf: bool)
     return [book, *pages]
 
 
-def _clutch(item: dict[str, Any]) -> list[str]:
+def _clutch(item: JsonObject) -> list[str]:
     summary = item["summary"] or {"at_least": None, "current": {"health": None}}
     cells = (
         item["clutch_id"], item["state"]["name"].replace("_", " "), item["action"], item["headline"], summary["at_least"],
@@ -92,7 +92,7 @@ def _clutch(item: dict[str, Any]) -> list[str]:
     return list(map(_text, cells))
 
 
-def _alarm(event: dict[str, Any]) -> tuple[Any, ...]:
+def _alarm(event: JsonObject) -> tuple[Any, ...]:
     return event["clutch_id"], event["state"], event["raised_at"], event["message"], event["note"]
 
 

@@ -3,11 +3,12 @@ afterwards, and the audit trail. Nothing is deleted.
 """
 
 import json
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
 from service.cli.options import EX_USAGE, ClutchId, Json, Reason, asking, fail, listed, print_line
+from service.client.clutchlife.answers import JsonObject
 from service.client.clutchlife.transport import Service
 
 RunId = Annotated[str, typer.Argument(metavar="RUN")]
@@ -127,18 +128,18 @@ def correct(
     _show(service.patch(f"/v1/clutches/{clutch}/runs/{run}", change | {"reason": reason}))
 
 
-def _show(receipt: dict[str, Any]) -> None:
+def _show(receipt: JsonObject) -> None:
     _print_runs([receipt | {"warnings": []} | ({} if receipt["state"] == "held" else {"doubts": []})])
 
 
-def _print_runs(items: list[dict[str, Any]]) -> None:
+def _print_runs(items: list[JsonObject]) -> None:
     for item in items:
         print_line(run_line(item))
         for notice in [*item["doubts"], *item["warnings"]]:
             print_line(f"    {notice['code']}: {notice['message']}")
 
 
-def run_line(receipt: dict[str, Any]) -> str:
+def run_line(receipt: JsonObject) -> str:
     sent = "" if receipt["cycles"] == receipt["sent_cycles"] else f" (sent as {receipt['sent_cycles']:g})"
     return f"{receipt['cycles']:>12g}  {receipt['state']:<9}  {receipt['kind']:<19}  {receipt['run_id']}{sent}"
 
@@ -147,14 +148,14 @@ def run_line(receipt: dict[str, Any]) -> str:
 def changes(service: Service, clutch: ClutchId, as_json: Json = False) -> None:
     """List the audit trail of a clutch, newest first."""
 
-    def show(items: list[dict[str, Any]]) -> None:
+    def show(items: list[JsonObject]) -> None:
         for item in items:
             print_line(_change(item))
 
     listed(service.pages(f"/v1/clutches/{clutch}/changes"), as_json, show, f"nothing was changed of {clutch}")
 
 
-def _change(item: dict[str, Any]) -> str:
+def _change(item: JsonObject) -> str:
     of_run = "" if item["run_id"] is None else f" {item['run_id']}"
     names = [name for name in item["after"] if name != "doubts" and item["before"].get(name) != item["after"][name]]
     changed = ", ".join(f"{name} {_shown(item['before'].get(name))} -> {_shown(item['after'][name])}" for name in names)

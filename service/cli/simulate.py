@@ -3,11 +3,12 @@
 import json
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
 from service.cli.options import EX_USAGE, Seed, err, errors_in_a_line, fail, out, print_line, spinning
+from service.client.clutchlife.answers import JsonObject
 from service.runs import manifest
 
 if TYPE_CHECKING:
@@ -101,7 +102,7 @@ def simulate(
         manifest.write(out_folder / manifest.CLUTCH_FILE, simulated.simulated_clutch_body(clutch_id))
         wear_and_cycles: list[tuple[float, float]] = []
         inspections = 0
-        listed: list[dict[str, Any]] = []
+        listed: list[JsonObject] = []
         with spinning(err) as progress:
             task = progress.add_task("run-in", total=clutch.end_of_life(_STOP))
             sensor = stationary.SHARP if noise is None else replace(stationary.SHARP, noise=noise)
@@ -214,7 +215,7 @@ def _sizes(hide: list[str]) -> dict[str, float]:
     return sizes
 
 
-def _write(folder: Path, run: "SimulatedRun", record_format: "RecordFormat") -> list[dict[str, Any]]:
+def _write(folder: Path, run: "SimulatedRun", record_format: "RecordFormat") -> list[JsonObject]:
     """One run into one file; its entry for the manifest, where it is not JSON."""
     from service.runs import record_writer, simulated  # start-up time
 

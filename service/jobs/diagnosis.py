@@ -15,6 +15,7 @@ import numpy as np
 from models.diagnosis.campaign import StationaryRun
 from models.diagnosis.extension import Extension
 from service import repository
+from service.api.life import LifePrediction
 from service.clutch.diagnosis.campaign import CampaignRun, DiagnosedLife, records_to_keep, run_of
 from service.clutch.diagnosis.report import public
 from service.clutch.model_correction import corrected_cofs
@@ -73,8 +74,9 @@ def diagnosed(task: DiagnosisTask, say: Callable[[Json], None] = lambda _: None)
         say({"step": "predicts"})
         before, after = before_and_after(database, task.clutch_id, diagnosed_life, report.extension)
     origin = 0.0 if diagnosed_life.life is None else diagnosed_life.life.origin
+    shown = public(report, origin=origin, before=before, after=after, notes=diagnosed_life.notes)
     return {
-        "report": public(report, origin=origin, before=before, after=after, notes=diagnosed_life.notes),
+        "report": repository.json_of(shown),
         "extension": None if report.extension is None else report.extension.to_dict(),
     }
 
@@ -117,19 +119,18 @@ def read_life(
 
 def before_and_after(
     database: Database, clutch_id: str, diagnosed_life: DiagnosedLife, extension: Extension | None
-) -> tuple[Mapping[str, Any], Mapping[str, Any]]:
+) -> tuple[LifePrediction | None, LifePrediction | None]:
     """The particle filter's prediction of the life that was diagnosed, by both models; alike where there is no extension."""
     if diagnosed_life.life is None:
-        return {}, {}
+        return None, None
     with database.reading() as connection:
         state = repository.state(connection, clutch_id, also=extension)
         by_key = results.cofs_of(connection, clutch_id)
         cofs = {run_id: by_key[key] for run_id, key in runs.keys(connection, clutch_id).items() if key in by_key}
     plain = diagnosed_life.life.with_cofs(cofs)
 
-    def prediction(life: Life, model: Extension | None) -> Mapping[str, Any]:
-        assumptions = state.assumptions_under(model, life)
-        return repository.json_of(predict_at([life], assumptions, state.fraction, method=_METHOD))
+    def prediction(life: Life, model: Extension | None) -> LifePrediction:
+        return predict_at([life], state.assumptions_under(model, life), state.fraction, method=_METHOD)
 
     before = prediction(plain, None)
     if extension is None:

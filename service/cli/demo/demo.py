@@ -10,13 +10,13 @@ import webbrowser
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
 from service.cli.diagnose import shown
 from service.cli.options import Seed, fail, out, print_line, spinning
-from service.client.clutchlife.answers import ServiceAwayError
+from service.client.clutchlife.answers import JsonObject, ServiceAwayError
 from service.client.clutchlife.client import diagnosed
 from service.client.clutchlife.transport import Service, connect
 
@@ -109,7 +109,7 @@ def _diagnosed(service: Service, clutch_id: str, end: float | None) -> None:
             out.print(f"{name:8} {_row(prediction, end)}", markup=False)
 
 
-def _row(prediction: dict[str, Any], end: float | None) -> str:
+def _row(prediction: JsonObject, end: float | None) -> str:
     current, remaining = prediction["current"], prediction["remaining_cycles"]
     cof = f"{current['mean_cof']:.4f} ± {current['mean_cof_sd']:.4f}"
     interval = f"{_count(remaining['0.05'])} … {_count(remaining['0.95'])}"
@@ -123,7 +123,7 @@ def _row(prediction: dict[str, Any], end: float | None) -> str:
     )
 
 
-def _inside(prediction: dict[str, Any], end: float | None) -> list[bool]:
+def _inside(prediction: JsonObject, end: float | None) -> list[bool]:
     """Whether the truth lay inside the interval, where one was given and the end of life was ahead."""
     low, high = (prediction["end_of_life_cycles"][quantile] for quantile in ("0.05", "0.95"))
     if low is None or end is None or prediction["as_of_cycles"] > end:

@@ -4,14 +4,13 @@ on the terminal, and with the lines and exit codes in which it ends.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from rich.progress import Progress
 
 from service.cli.options import EX_DATAERR, EX_TEMPFAIL, err, fail, out, say
 from service.cli.sending import spool as entries
 from service.cli.sending.spool import INSPECTIONS, RUNS, Entry, HeldError, Spool
-from service.client.clutchlife.answers import RefusedError, ServiceAwayError, suggested
+from service.client.clutchlife.answers import JsonObject, RefusedError, ServiceAwayError, suggested
 from service.client.clutchlife.transport import NoLongerWantedError, Service, connect
 
 
@@ -166,7 +165,7 @@ def _refused(spool: Spool, entry: Entry, error: RefusedError, report: Report) ->
         )
 
 
-def _remarks(receipt: dict[str, Any], name: str, spool: Spool, *, waited: bool) -> list[str]:
+def _remarks(receipt: JsonObject, name: str, spool: Spool, *, waited: bool) -> list[str]:
     """What the sender has to know of what was stored: that it is doubted, or not what was sent any more."""
     cycles = receipt.get("cycles")
     sent_cycles = receipt.get("sent_cycles", cycles)

@@ -4,7 +4,7 @@ import json
 from collections.abc import Mapping
 from itertools import groupby
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -21,7 +21,7 @@ from service.cli.sending.spool import (
     Spool,
     default_folder,
 )
-from service.client.clutchlife.answers import RefusedError, ServiceAwayError
+from service.client.clutchlife.answers import JsonObject, RefusedError, ServiceAwayError
 from service.client.clutchlife.transport import Service, connect
 from service.runs import manifest
 
@@ -120,7 +120,7 @@ def _warn_of_others(spool: Spool, digests: set[str]) -> None:
         options.say(f"{count} for {spool.clutch_id} since {oldest} and will be sent too: see clutchlife spool list")
 
 
-def _record(paths: list[Path], clutch_id: str) -> dict[str, Any] | None:
+def _record(paths: list[Path], clutch_id: str) -> JsonObject | None:
     """What a `clutch.json` in one of the folders says of the clutch; that of another clutch says nothing of it."""
     for record in (path / manifest.CLUTCH_FILE for path in paths):
         body = json.loads(record.read_bytes()) if record.is_file() else {}
@@ -143,7 +143,7 @@ def _require_known(url: str, key: str | None, clutch_id: str) -> None:
                 options.fail(str(error), options.EX_DATAERR)
 
 
-def _register(service: Service, clutch_id: str, record: dict[str, Any] | None) -> None:
+def _register(service: Service, clutch_id: str, record: JsonObject | None) -> None:
     """Register the clutch from its record; without one it must be registered already."""
     if record is None:
         service.get(f"/v1/clutches/{clutch_id}")
@@ -238,7 +238,7 @@ def _owner(entry: Entry) -> tuple[str, str]:
     return entry.url, entry.clutch_id
 
 
-def _item(folder: Path, entry: Entry) -> dict[str, Any]:
+def _item(folder: Path, entry: Entry) -> JsonObject:
     head = entry.head
     return {
         "state": entry.state,

@@ -21,6 +21,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from service.client.clutchlife.answers import JsonObject
+
 #: What is known of all; the bytes of one; a file that is being written.
 DATABASE, BODY, PARTIAL = "spool.sqlite", ".body", ".part"
 #: What is sent to, below the clutch's address.
@@ -137,7 +139,7 @@ class Entry:
     last_try: str | None = None
     last_answer: str | None = None
     perhaps_stored: bool = False
-    problem: dict[str, Any] = field(default_factory=dict)
+    problem: JsonObject = field(default_factory=dict)
 
     @property
     def body(self) -> str:
@@ -357,7 +359,7 @@ class Spool:
             self._remove(database, [(number, _body(number, entry.digest)) for (number,) in numbers])
             return waited
 
-    def refuse(self, entry: Entry, problem: dict[str, Any]) -> Path | None:
+    def refuse(self, entry: Entry, problem: JsonObject) -> Path | None:
         """Set aside an entry that the service refuses, with the answer; where it is, None where it waits no more."""
         with self._changing() as database:
             current = _there(database, entry)

@@ -14,13 +14,15 @@
 from collections.abc import Mapping
 from datetime import UTC, datetime
 from email.utils import parsedate_to_datetime
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from .notebook import as_html
 
 if TYPE_CHECKING:
     import httpx2
 
+#: A JSON object, as the service answers it or is sent it.
+JsonObject: TypeAlias = dict[str, Any]
 #: Statuses below 500 that pass by themselves: a slow request, one that came too early, too many of them.
 _TRANSIENT = (408, 425, 429)
 #: Statuses that hold for every run of a clutch: no key, no permission, no such clutch or address, a proxy's key; 0 is an
@@ -39,9 +41,9 @@ _MAX_QUOTED = 500
 class ClutchlifeError(Exception):
     """Base of what the client raises. `problem` is the service's report (RFC 9457), empty where there is none."""
 
-    problem: dict[str, Any]
+    problem: JsonObject
 
-    def __init__(self, message: str, problem: dict[str, Any] | None = None) -> None:
+    def __init__(self, message: str, problem: JsonObject | None = None) -> None:
         super().__init__(message)
         self.problem = {} if problem is None else problem
 
@@ -52,7 +54,7 @@ class ServiceAwayError(ClutchlifeError):
     `perhaps_stored`: a try reached a server and got no answer of the service, so it may have been carried out.
     """
 
-    def __init__(self, message: str, *, perhaps_stored: bool = True, problem: dict[str, Any] | None = None) -> None:
+    def __init__(self, message: str, *, perhaps_stored: bool = True, problem: JsonObject | None = None) -> None:
         super().__init__(message, problem)
         self.perhaps_stored = perhaps_stored
 
@@ -68,7 +70,7 @@ _SUGGESTED = ("table", "time", "decimal", "missing", "good", "kind", "cycles", "
 class RefusedError(ClutchlifeError):
     """The service refused the request; repeating it would be refused again. `problem["errors"]` says what is wrong where."""
 
-    def __init__(self, status: int, problem: dict[str, Any]) -> None:
+    def __init__(self, status: int, problem: JsonObject) -> None:
         reason = str(problem.get("detail") or problem.get("title") or "refused")
         super().__init__(f"{status}: {reason}" if status else reason, problem)
         self.status = status
@@ -84,7 +86,7 @@ class RefusedError(ClutchlifeError):
         return self.status in _ALL_RUNS or self.problem.get("type") == _ARCHIVED
 
     @property
-    def suggestion(self) -> dict[str, Any] | None:
+    def suggestion(self) -> JsonObject | None:
         """How a refused file may be read, for you to confirm (`Client.confirm_suggestion`); None: nothing is suggested."""
         held = self.problem.get("suggestion")
         return held if isinstance(held, dict) else None
@@ -100,7 +102,7 @@ class RefusedError(ClutchlifeError):
         return self.problem.get("type") == _CONFLICT
 
 
-def suggested(suggestion: dict[str, Any]) -> str:
+def suggested(suggestion: JsonObject) -> str:
     """A suggestion in a line: its columns, clock, run and first row."""
     parts = [f"{channel} from {title}" for channel, title in suggestion["map"].items()]
     stated = {name: suggestion[name] for name in _SUGGESTED if suggestion.get(name) not in (None, "")}
@@ -130,7 +132,7 @@ def perhaps_stored(response: "httpx2.Response") -> bool:
     return response.status_code not in _STORED_NOTHING
 
 
-class ServiceAnswer(dict[str, Any]):
+class ServiceAnswer(JsonObject):
     """A JSON object as the service sent it; a notebook shows it as a table."""
 
     def _repr_html_(self) -> str:
@@ -157,7 +159,7 @@ def image(response: "httpx2.Response") -> bytes | None:
     return response.content if media.startswith(("image/", "application/octet-stream")) else None
 
 
-def problem(response: "httpx2.Response") -> dict[str, Any]:
+def problem(response: "httpx2.Response") -> JsonObject:
     """The problem report of a refusal, or its text as one."""
     report = content(response)
     return {"detail": response.text[:_MAX_QUOTED]} if report is None else report

@@ -14,15 +14,13 @@ from types import TracebackType
 from typing import Any, Self
 from urllib.parse import quote
 
-from .answers import DiagnosisFailedError, RefusedError
+from .answers import DiagnosisFailedError, JsonObject, RefusedError
 from .tables import Frames, columns, table
 from .transport import Service, connect
 
 #: Seconds that the service may hold a request for a diagnosis, and seconds between two looks at it afterwards.
 _WAIT, _LOOK = 10, 0.5
 _JSON_SUFFIX = ".json"
-
-Answer = dict[str, Any]
 
 
 class Client:
@@ -65,11 +63,11 @@ class Client:
         """All clutches as a table, what needs somebody first; `archived=True`: the archived ones."""
         return self._table("/v1/clutches", **arguments)
 
-    def clutch(self, clutch_id: str) -> Answer:
+    def clutch(self, clutch_id: str) -> JsonObject:
         """One clutch: its record, its state and its remaining life in short."""
         return self.service.get(_clutch(clutch_id))
 
-    def register(self, clutch_id: str, **record: Any) -> Answer:
+    def register(self, clutch_id: str, **record: Any) -> JsonObject:
         """Register a clutch; what is left out has the reference's values. The same again changes nothing."""
         return self.service.post("/v1/clutches", {"clutch_id": clutch_id, **record})
 
@@ -80,11 +78,11 @@ class Client:
         fits and loops are left out: `stribeck` and `loops` have them."""
         return self._table(f"{_clutch(clutch_id)}/runs", without=("fits", "loops"), **arguments)
 
-    def run(self, clutch_id: str, run_id: str, **arguments: Any) -> Answer:
+    def run(self, clutch_id: str, run_id: str, **arguments: Any) -> JsonObject:
         """One run with its channels; `points=2000` thins them."""
         return self.service.get(f"{_clutch(clutch_id)}/runs/{quote(run_id, safe='')}", **arguments)
 
-    def post_run(self, clutch_id: str, run: Mapping[str, Any] | str | Path | None = None, **fields: Any) -> Answer:
+    def post_run(self, clutch_id: str, run: Mapping[str, Any] | str | Path | None = None, **fields: Any) -> JsonObject:
         """Send a run; its receipt. Safe to repeat.
 
         `run` is its content, or its file: JSON, or a recorder's file with `kind` and `cycles` or a `rig`. Instead of or
@@ -106,7 +104,7 @@ class Client:
 
     def confirm_suggestion(
         self, clutch_id: str, run: str | Path, refused: RefusedError, rig: str | None = None, **fields: Any
-    ) -> Answer:
+    ) -> JsonObject:
         """Send a file again as its refusal suggests; its receipt. `rig`: a new name, under which the reading is kept for the
         next files. `fields`, such as `cycles`, come before what is suggested.
 
@@ -117,22 +115,22 @@ class Client:
         said = {name: refused.suggestion[name] for name in ("profile", "time", "kind", "cycles")}
         return self.post_run(clutch_id, run, **{**said, "rig": rig, **fields})
 
-    def confirm(self, clutch_id: str, *run_ids: str, reason: str = "") -> Answer:
+    def confirm(self, clutch_id: str, *run_ids: str, reason: str = "") -> JsonObject:
         """Accept held runs as they were sent, all of them in one step; their receipts are in `items`."""
         return self.service.post(f"{_clutch(clutch_id)}/runs/confirm", {"run_ids": run_ids, "reason": reason})
 
     # --- what is known ---
 
-    def remaining_useful_life(self, clutch_id: str, **arguments: Any) -> Answer:
+    def remaining_useful_life(self, clutch_id: str, **arguments: Any) -> JsonObject:
         """The duty cycles that remain, with quantiles; arguments are those of the API: `method`, `at_cycles`, ..."""
         return self.service.get(f"{_clutch(clutch_id)}/remaining-useful-life", **arguments)
 
-    def forecast(self, clutch_id: str, programme: Any, **fields: Any) -> Answer:
+    def forecast(self, clutch_id: str, programme: Any, **fields: Any) -> JsonObject:
         """Remaining life under planned duty: `programme=[{"cycles": 5000, "energy_per_cycle_kj": 25}]`."""
         address = f"{_clutch(clutch_id)}/remaining-useful-life/forecast"
         return self.service.post(address, {"programme": list(programme), **fields})
 
-    def degradation(self, clutch_id: str, **arguments: Any) -> Answer:
+    def degradation(self, clutch_id: str, **arguments: Any) -> JsonObject:
         """The coefficients of every tracked quantity's course, with their uncertainty."""
         return self.service.get(f"{_clutch(clutch_id)}/degradation", **arguments)
 
@@ -152,7 +150,7 @@ class Client:
 
     def diagnose(
         self, clutch_id: str, *, adopt: bool = False, isolability: bool = False, wait: float = 600.0
-    ) -> Answer:
+    ) -> JsonObject:
         """Have a clutch diagnosed and wait for the report. Raises DiagnosisFailedError where it failed, TimeoutError where
         it has not ended after `wait` [s]. `adopt`: the extended model is adopted if there is one; `isolability`: the report
         says which causes these tests could tell apart."""
@@ -165,7 +163,7 @@ class Client:
         """The diagnoses of a clutch as a table, newest first."""
         return self._table(f"{_clutch(clutch_id)}/diagnoses", **arguments)
 
-    def adopt(self, clutch_id: str, diagnosis_id: str | None) -> Answer:
+    def adopt(self, clutch_id: str, diagnosis_id: str | None) -> JsonObject:
         """Track a clutch under a diagnosis's extended model; None: under the baseline again."""
         return self.service.put(f"{_clutch(clutch_id)}/model", {"diagnosis_id": diagnosis_id})
 
@@ -175,7 +173,7 @@ class Client:
         """The rules of alarms as a table."""
         return self._table("/v1/alarms", **arguments)
 
-    def add_alarm(self, quantity: str, **rule: Any) -> Answer:
+    def add_alarm(self, quantity: str, **rule: Any) -> JsonObject:
         """Make a rule: `add_alarm("remaining_cycles", clutch_id="e", below=4000)`."""
         return self.service.post("/v1/alarms", {"quantity": quantity, **rule})
 
@@ -183,7 +181,7 @@ class Client:
         """What rules have raised as a table, newest first; `state="open"`: what is not over."""
         return self._table("/v1/alarms/events", **arguments)
 
-    def acknowledge(self, event_id: str, note: str = "") -> Answer:
+    def acknowledge(self, event_id: str, note: str = "") -> JsonObject:
         """Say that somebody has seen an alarm."""
         return self.service.post(f"/v1/alarms/events/{quote(event_id, safe='')}/acknowledge", {"note": note})
 
@@ -198,7 +196,7 @@ def diagnosed(
     adopt: bool,
     isolability: bool = False,
     wait: float = math.inf,
-) -> Answer:
+) -> JsonObject:
     """The report of a diagnosis that is asked for, once it has ended. Raises TimeoutError after `wait` [s]."""
     address = f"{_clutch(clutch_id)}/diagnoses"
     deadline = time.monotonic() + wait
@@ -221,7 +219,7 @@ def _clutch(clutch_id: str) -> str:
     return f"/v1/clutches/{quote(clutch_id, safe='')}"
 
 
-def _content(fields: Mapping[str, Any]) -> dict[str, Any]:
+def _content(fields: Mapping[str, Any]) -> JsonObject:
     """A run as JSON has it; what is None is left out."""
     stated = {name: value for name, value in fields.items() if value is not None}
     if "channels" in stated:

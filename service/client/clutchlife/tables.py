@@ -5,6 +5,8 @@ import importlib.util
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, Literal
 
+from .answers import JsonObject
+
 #: What a table is: a frame of this library, a list of dictionaries, or (`auto`) the first that is installed, in this order.
 Frames = Literal["auto", "pandas", "polars", "list"]
 #: Lists of what is odd, each with its code.
@@ -28,7 +30,7 @@ def table(
     if library == "list":
         return [dict(item) for item in items]
     left_out = {row_of, *without}
-    rows: list[dict[str, Any]] = []
+    rows: list[JsonObject] = []
     for item in items:
         shared = {name: value for name, value in item.items() if name not in left_out}
         parts: Sequence[Mapping[str, Any]] = (item.get(row_of) if row_of else None) or ({},)

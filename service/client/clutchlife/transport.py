@@ -7,7 +7,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from .answers import RefusedError, ServiceAwayError, content, csv, image, passing, perhaps_stored, problem, retry_after
+from .answers import (
+    JsonObject,
+    RefusedError,
+    ServiceAwayError,
+    content,
+    csv,
+    image,
+    passing,
+    perhaps_stored,
+    problem,
+    retry_after,
+)
 
 if TYPE_CHECKING:
     import httpx2
@@ -41,20 +52,20 @@ class Service:
     patience: float = 60.0
     on_wait: Callable[[str, float], None] = lambda _reason, _seconds: None
 
-    def post(self, path: str, content: Mapping[str, Any], *, prefer: str | None = None) -> dict[str, Any]:
+    def post(self, path: str, content: Mapping[str, Any], *, prefer: str | None = None) -> JsonObject:
         """The answer to a body of JSON; raises ServiceAwayError or RefusedError."""
         headers = JSON if prefer is None else JSON | {"Prefer": prefer}
         return self._answer("POST", path, content=_body(content), headers=headers)
 
-    def put(self, path: str, content: Mapping[str, Any]) -> dict[str, Any]:
+    def put(self, path: str, content: Mapping[str, Any]) -> JsonObject:
         """The answer to a body of JSON that replaces what is at `path`; raises as `post` does."""
         return self._answer("PUT", path, content=_body(content), headers=JSON)
 
-    def patch(self, path: str, content: Mapping[str, Any]) -> dict[str, Any]:
+    def patch(self, path: str, content: Mapping[str, Any]) -> JsonObject:
         """The answer to a body of JSON that changes what is at `path`; raises as `post` does."""
         return self._answer("PATCH", path, content=_body(content), headers=JSON)
 
-    def pages(self, path: str, **params: Any) -> Iterator[dict[str, Any]]:
+    def pages(self, path: str, **params: Any) -> Iterator[JsonObject]:
         """The items of a list, page by page; raises as `post` does."""
         cursor: dict[str, str] = {}
         while True:
@@ -66,7 +77,7 @@ class Service:
 
     def post_file(
         self, path: str, file: Path, parameters: Mapping[str, str] | None, wanted: Callable[[], bool] = lambda: True
-    ) -> dict[str, Any]:
+    ) -> JsonObject:
         """The answer to a run's file, or to a JSON body where there are no parameters; raises as `post` does.
 
         `wanted` is asked before every try; NoLongerWantedError where it says no.
@@ -75,14 +86,12 @@ class Service:
             return self._answer("POST", path, file=file, wanted=wanted, headers=JSON)
         return self._answer("POST", path, file=file, wanted=wanted, params=dict(parameters))
 
-    def post_form(
-        self, path: str, file: Path, profile: Mapping[str, Any], parameters: Mapping[str, str]
-    ) -> dict[str, Any]:
+    def post_form(self, path: str, file: Path, profile: Mapping[str, Any], parameters: Mapping[str, str]) -> JsonObject:
         """The answer to a file with the profile by which it is read; raises as `post` does."""
         form = {"profile": json.dumps(profile)}
         return self._answer("POST", path, file=file, params=dict(parameters), data=form)
 
-    def post_photograph(self, path: str, file: Path, media_type: str) -> dict[str, Any]:
+    def post_photograph(self, path: str, file: Path, media_type: str) -> JsonObject:
         """The answer to a photograph's file; raises as `post` does."""
         return self._answer("POST", path, file=file, headers={"Content-Type": media_type})
 
@@ -90,11 +99,11 @@ class Service:
         """The file that answers a GET; raises as `post` does."""
         return self._repeated("GET", path, image)
 
-    def delete(self, path: str) -> dict[str, Any]:
+    def delete(self, path: str) -> JsonObject:
         """The answer to a DELETE, empty where it says nothing; raises as `post` does."""
         return self._repeated("DELETE", path, lambda response: {} if response.status_code == 204 else content(response))
 
-    def get(self, path: str, **params: Any) -> dict[str, Any]:
+    def get(self, path: str, **params: Any) -> JsonObject:
         """The answer to a GET; raises as `post` does."""
         return self._answer("GET", path, params=params)
 
@@ -102,7 +111,7 @@ class Service:
         """The CSV that answers a GET; raises as `post` does."""
         return self._repeated("GET", path, csv, params=params)
 
-    def _answer(self, method: str, path: str, **request: Any) -> dict[str, Any]:
+    def _answer(self, method: str, path: str, **request: Any) -> JsonObject:
         return self._repeated(method, path, content, **request)
 
     def _repeated(
@@ -118,7 +127,7 @@ class Service:
         import httpx2  # start-up time
 
         deadline, wait, unsure = time.monotonic() + self.patience, FIRST_WAIT, False
-        report: dict[str, Any] | None = None
+        report: JsonObject | None = None
         while True:
             if not wanted():
                 raise NoLongerWantedError
@@ -146,7 +155,7 @@ class Service:
             time.sleep(wait)
             wait = min(2 * wait, LAST_WAIT)
 
-    def _try(self, method: str, path: str, file: Path | None, request: dict[str, Any]) -> "httpx2.Response":
+    def _try(self, method: str, path: str, file: Path | None, request: JsonObject) -> "httpx2.Response":
         if file is None:
             return self.http.request(method, path, **request)
         with file.open("rb") as opened:

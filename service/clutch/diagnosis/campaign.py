@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
-from typing import Any, TypeAlias, TypeVar
+from typing import TypeAlias, TypedDict, TypeVar
 
 import numpy as np
 
@@ -98,13 +98,25 @@ def without_record(run: IncomingRun, *, origin: float) -> CampaignRun:
     return run_of(run, origin=origin)
 
 
-def head_of(run: IncomingRun, origin: float) -> dict[str, Any]:
+class Moment(TypedDict):
+    """When something was: cycles from the life's origin, and when it was started [s since 1970], None where not said."""
+
+    cycles: float
+    moment: float | None
+
+
+class RunHead(Moment):
     """What every test has."""
+
+    run_id: str
+
+
+def head_of(run: IncomingRun, origin: float) -> RunHead:
+    """Name and moment of a test, its cycles counted from `origin`."""
     return {"run_id": run.run_id, **_when(run, origin)}
 
 
-def _when(run: IncomingRun, origin: float) -> dict[str, Any]:
-    """`moment` is when it was started [s since 1970], None where the rig did not say."""
+def _when(run: IncomingRun, origin: float) -> Moment:
     moment = None if run.started_at is None else datetime.fromisoformat(run.started_at).timestamp()
     return {"cycles": run.cycles - origin, "moment": moment}
 

@@ -3,24 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from enum import Enum
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
 from models.arrays import FloatArray
 from service.api import diagnosis as shapes
 from service.api.base import Answer
+from service.api.life import LifePrediction
 from service.channels import PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM, ZERO_CELSIUS, bar
 
 if TYPE_CHECKING:  # start-up time: they load the whole diagnosis
     from models.diagnosis.experiments.candidates import Step
     from models.diagnosis.report.friction_law import FrictionLaw, LawCurve
     from models.diagnosis.report.maps import LoopTrace, Maps
-    from models.diagnosis.report.report import Misfit, Report
+    from models.diagnosis.report.report import Isolability, Misfit, Report
     from models.diagnosis.validation.held_out import Gain
 
+Shape = TypeVar("Shape", bound=Answer)
 #: Maps and traces are looked at: more digits than these only weigh.
 _DIGITS = 6
 
@@ -29,53 +30,86 @@ _DIGITS = 6
 _GAIN = {"reduction_percent_sd": "reduction_sd", "prediction_log_score_gain": "forecast_log_score_gain"}
 
 
-def empty() -> dict[str, Any]:
-    """The report of a diagnosis that has none: nothing said, in the same shape."""
-    return {
-        "verdict": None,
-        "causes": [],
-        "summary": "",
-        "explanations": [],
-        "candidates": [],
-        "baseline": _misfit(None),
-        "extended": _misfit(None),
-        "gain": _gain(None, {}, {}),
-        "friction_law": None,
-        "like_the_law": [],
-        "advice": [],
-        "visible": [],
-        "not_adoptable": None,
-        "notes": [],
-        "statistics": {},
-        "maps": None,
-        "loops": [],
-        "law_curves": [],
-        "isolability": None,
-    }
+def finite(value: float) -> float | None:
+    """The number where it is one that JSON can carry, else None."""
+    number = float(value)
+    return number if math.isfinite(number) else None
+
+
+def _misfit(misfit: Misfit | None) -> shapes.MisfitOut:
+    if misfit is None:
+        return shapes.MisfitOut(rmse_nm=None, noise_nm=None, unexplained_share=None, where=[])
+    return _shaped(
+        shapes.MisfitOut,
+        misfit,
+        rmse_nm=finite(misfit.rmse),
+        noise_nm=finite(misfit.noise),
+        where=[_shaped(shapes.WhereOut, axis) for axis in misfit.where],
+    )
+
+
+def _gain(gain: Gain | None, before: LifePrediction | None, after: LifePrediction | None) -> shapes.GainOut:
+    numbers = [name for name in shapes.GainOut.model_fields if name not in {"held_out_runs", "remaining_useful_life"}]
+    attributes = {name: _GAIN.get(name, name.removesuffix("_nm")) for name in numbers}
+    return shapes.GainOut(
+        held_out_runs=[] if gain is None else list(gain.held_out_runs),
+        **{name: None if gain is None else finite(getattr(gain, attribute)) for name, attribute in attributes.items()},
+        remaining_useful_life=shapes.BeforeAndAfter(before=_stored(before), after=_stored(after)),
+    )
+
+
+def _stored(prediction: LifePrediction | None) -> dict[str, object]:
+    """A prediction as JSON columns keep it; nothing without one."""
+    return {} if prediction is None else prediction.model_dump(mode="json", exclude_unset=True)
+
+
+#: The report of a diagnosis that has none: nothing said, in the same shape.
+EMPTY = shapes.ReportOut(
+    verdict=None,
+    causes=[],
+    summary="",
+    explanations=[],
+    candidates=[],
+    baseline=_misfit(None),
+    extended=_misfit(None),
+    gain=_gain(None, None, None),
+    advice=[],
+    visible=[],
+    notes=[],
+    statistics={},
+    maps=None,
+    loops=[],
+)
 
 
 def public(
-    report: Report, *, origin: float, before: Mapping[str, Any], after: Mapping[str, Any], notes: tuple[str, ...]
-) -> dict[str, Any]:
+    report: Report,
+    *,
+    origin: float,
+    before: LifePrediction | None,
+    after: LifePrediction | None,
+    notes: tuple[str, ...],
+) -> shapes.ReportOut:
     """The report as it is answered; its cycles counted from `origin` become cycles since new.
 
     `before` and `after` are the remaining useful life under the baseline and under the extension.
     """
-    return empty() | {
-        "verdict": report.verdict.value,
-        "causes": list(report.causes),
-        "summary": " ".join(part for part in (report.summary, _remaining(report, before, after)) if part),
-        "explanations": [_shaped(shapes.ExplanationOut, explanation) for explanation in report.explanations],
-        "candidates": [
+    law = report.friction_law
+    return shapes.ReportOut(
+        verdict=report.verdict.value,
+        causes=list(report.causes),
+        summary=" ".join(part for part in (report.summary, _remaining(report, before, after)) if part),
+        explanations=[_shaped(shapes.ExplanationOut, explanation) for explanation in report.explanations],
+        candidates=[
             _shaped(shapes.CandidateOut, candidate, estimate=_shaped(shapes.Amplitude, candidate.estimate))
             for candidate in report.candidates
         ],
-        "baseline": _misfit(report.baseline),
-        "extended": _misfit(report.extended),
-        "gain": _gain(report.gain, before, after),
-        "friction_law": None if report.friction_law is None else _friction_law(report.friction_law),
-        "like_the_law": list(report.like_the_law),
-        "advice": [
+        baseline=_misfit(report.baseline),
+        extended=_misfit(report.extended),
+        gain=_gain(report.gain, before, after),
+        friction_law=None if law is None else _friction_law(law),
+        like_the_law=list(report.like_the_law),
+        advice=[
             _shaped(
                 shapes.AdviceOut,
                 test,
@@ -86,36 +120,35 @@ def public(
             )
             for test in report.advice
         ],
-        "visible": [_shaped(shapes.VisibleOut, smallest) for smallest in report.visible],
-        "not_adoptable": report.not_adoptable or None,
-        "notes": [*notes, *report.notes],
-        "statistics": {name: finite(value) for name, value in report.statistics.items()},
-        "maps": None if report.maps is None else _maps(report.maps, origin),
-        "loops": [_loop(loop, origin) for loop in report.loops],
-        "law_curves": []
-        if report.friction_law is None
-        else [_law_curve(curve, origin) for curve in report.friction_law.curves],
-        "isolability": None
-        if report.isolability is None
-        else {
-            "pairs": [
-                _shaped(
-                    shapes.PairOut,
-                    pair,
-                    key=pair.trial or None,
-                    test=pair.test or None,
-                    with_test=finite(pair.with_trial),
-                )
-                for pair in report.isolability.pairs
-            ],
-            "unseen": list(report.isolability.unseen),
-        },
-    }
+        visible=[_shaped(shapes.VisibleOut, smallest) for smallest in report.visible],
+        not_adoptable=report.not_adoptable or None,
+        notes=[*notes, *report.notes],
+        statistics={name: finite(value) for name, value in report.statistics.items()},
+        maps=None if report.maps is None else _maps(report.maps, origin),
+        loops=[_loop(loop, origin) for loop in report.loops],
+        law_curves=[] if law is None else [_law_curve(curve, origin) for curve in law.curves],
+        isolability=None if report.isolability is None else _isolability(report.isolability),
+    )
 
 
-def _shaped(schema: type[Answer], found: object, **others: Any) -> dict[str, Any]:
-    """The fields of a schema, of what was found; the others in their places."""
-    return {name: others[name] if name in others else _plain(getattr(found, name)) for name in schema.model_fields}
+def _isolability(isolability: Isolability) -> shapes.IsolabilityOut:
+    pairs = [
+        _shaped(
+            shapes.PairOut,
+            pair,
+            key=pair.trial or None,
+            test=pair.test or None,
+            with_test=finite(pair.with_trial),
+        )
+        for pair in isolability.pairs
+    ]
+    return shapes.IsolabilityOut(pairs=pairs, unseen=list(isolability.unseen))
+
+
+def _shaped(shape: type[Shape], found: object, **others: Any) -> Shape:
+    """An answer with the fields of what was found; the others in their places."""
+    fields = shape.model_fields
+    return shape(**{name: others[name] if name in others else _plain(getattr(found, name)) for name in fields})
 
 
 def _plain(value: Any) -> Any:
@@ -126,14 +159,17 @@ def _plain(value: Any) -> Any:
     return finite(value) if isinstance(value, float) else value
 
 
-def _remaining(report: Report, before: Mapping[str, Any], after: Mapping[str, Any]) -> str:
+def _remaining(report: Report, before: LifePrediction | None, after: LifePrediction | None) -> str:
     """What adopting the extension would do to the median of the remaining life, in a sentence; nothing without one.
 
     Two digits: a filter's draws move the third, and with them the clutch's name."""
-    medians = [(forecast.get("remaining_cycles") or {}).get("0.5") for forecast in (before, after)]
-    if report.extension is None or None in medians:
+    medians = [None if prediction is None else prediction.remaining_cycles.get("0.5") for prediction in (before, after)]
+    if report.extension is None:
         return ""
-    now, then = (f"{float(f'{median:.2g}'):,.0f}" for median in medians)
+    rounded = [f"{float(f'{median:.2g}'):,.0f}" for median in medians if median is not None]
+    if len(rounded) < 2:
+        return ""
+    now, then = rounded
     if now == then == "0":
         return ""
     if now == "0":
@@ -145,7 +181,7 @@ def _remaining(report: Report, before: Mapping[str, Any], after: Mapping[str, An
     return f"If you adopt it, the median of the remaining life changes from about {now} to about {then} cycles."
 
 
-def _step(step: Step, origin: float) -> dict[str, Any]:
+def _step(step: Step, origin: float) -> shapes.PlanStep:
     return _shaped(
         shapes.PlanStep,
         step,
@@ -159,47 +195,19 @@ def _step(step: Step, origin: float) -> dict[str, Any]:
     )
 
 
-def finite(value: float) -> float | None:
-    """The number where it is one that JSON can carry, else None."""
-    number = float(value)
-    return number if math.isfinite(number) else None
-
-
-def _misfit(misfit: Misfit | None) -> dict[str, Any]:
-    if misfit is None:
-        return {"rmse_nm": None, "noise_nm": None, "unexplained_share": None, "where": []}
-    return _shaped(
-        shapes.MisfitOut,
-        misfit,
-        rmse_nm=finite(misfit.rmse),
-        noise_nm=finite(misfit.noise),
-        where=[_shaped(shapes.WhereOut, axis) for axis in misfit.where],
-    )
-
-
-def _gain(gain: Gain | None, before: Mapping[str, Any], after: Mapping[str, Any]) -> dict[str, Any]:
-    numbers = [name for name in shapes.GainOut.model_fields if name not in {"held_out_runs", "remaining_useful_life"}]
-    attributes = {name: _GAIN.get(name, name.removesuffix("_nm")) for name in numbers}
-    return {
-        "held_out_runs": [] if gain is None else list(gain.held_out_runs),
-        **{name: None if gain is None else finite(getattr(gain, attribute)) for name, attribute in attributes.items()},
-        "remaining_useful_life": {"before": dict(before), "after": dict(after)},
-    }
-
-
-def _friction_law(law: FrictionLaw) -> dict[str, Any]:
+def _friction_law(law: FrictionLaw) -> shapes.FrictionLawOut:
     gain = law.gain
     effect = law.effect_on_remaining_cycles_percent
     return _shaped(
         shapes.FrictionLawOut,
         law,
         where=[
-            {
-                "axis": "speed_rpm",
-                "from_rpm": _rounded(band.low / RADIANS_PER_SECOND_PER_RPM),
-                "to_rpm": _rounded(band.high / RADIANS_PER_SECOND_PER_RPM),
-                "share": _rounded(band.share),
-            }
+            shapes.LawBandOut(
+                axis="speed_rpm",
+                from_rpm=_rounded(band.low / RADIANS_PER_SECOND_PER_RPM),
+                to_rpm=_rounded(band.high / RADIANS_PER_SECOND_PER_RPM),
+                share=_rounded(band.share),
+            )
             for band in law.where
         ],
         effect_on_remaining_cycles_percent=None if effect is None else finite(effect),
@@ -215,46 +223,46 @@ def _friction_law(law: FrictionLaw) -> dict[str, Any]:
     )
 
 
-def _law_curve(curve: LawCurve, origin: float) -> dict[str, Any]:
-    return {
-        "pressure_bar": curve.pressure / PASCALS_PER_BAR,
-        "cycles": curve.cycles + origin,
-        "speed_rpm": _numbers(curve.speed / RADIANS_PER_SECOND_PER_RPM),
-        "measured_nm": _numbers(curve.measured),
-        "eq3_nm": _numbers(curve.eq3),
-        "law_nm": _numbers(curve.law),
-        "law_sd_nm": _numbers(curve.sd),
-    }
+def _law_curve(curve: LawCurve, origin: float) -> shapes.LawCurveOut:
+    return shapes.LawCurveOut(
+        pressure_bar=curve.pressure / PASCALS_PER_BAR,
+        cycles=curve.cycles + origin,
+        speed_rpm=_numbers(curve.speed / RADIANS_PER_SECOND_PER_RPM),
+        measured_nm=_numbers(curve.measured),
+        eq3_nm=_numbers(curve.eq3),
+        law_nm=_numbers(curve.law),
+        law_sd_nm=_numbers(curve.sd),
+    )
 
 
-def _maps(maps: Maps, origin: float) -> dict[str, Any]:
-    return {
-        "axes": {
-            "pressure_bar": [bar(pressure) for pressure in maps.pressure.tolist()],
-            "speed_rpm": _numbers(maps.speed / RADIANS_PER_SECOND_PER_RPM),
-            "cycles": _numbers(maps.cycles + origin),
-        },
-        "before": {
-            "speed_pressure": _numbers(maps.speed_pressure_before),
-            "pressure_cycles": _numbers(maps.pressure_cycles_before),
-        },
-        "after": {
-            "speed_pressure": _numbers(maps.speed_pressure_after),
-            "pressure_cycles": _numbers(maps.pressure_cycles_after),
-        },
-    }
+def _maps(maps: Maps, origin: float) -> shapes.MapsOut:
+    return shapes.MapsOut(
+        axes=shapes.Axes(
+            pressure_bar=[bar(pressure) for pressure in maps.pressure.tolist()],
+            speed_rpm=_numbers(maps.speed / RADIANS_PER_SECOND_PER_RPM),
+            cycles=_numbers(maps.cycles + origin),
+        ),
+        before=shapes.ResidualMap(
+            speed_pressure=_numbers(maps.speed_pressure_before),
+            pressure_cycles=_numbers(maps.pressure_cycles_before),
+        ),
+        after=shapes.ResidualMap(
+            speed_pressure=_numbers(maps.speed_pressure_after),
+            pressure_cycles=_numbers(maps.pressure_cycles_after),
+        ),
+    )
 
 
-def _loop(loop: LoopTrace, origin: float) -> dict[str, Any]:
-    return {
-        "pressure_bar": loop.pressure / PASCALS_PER_BAR,
-        "cycles": loop.cycles + origin,
-        "frequency_hz": finite(loop.frequency),
-        "speed_rpm": _numbers(loop.speed / RADIANS_PER_SECOND_PER_RPM),
-        "measured_nm": _numbers(loop.measured),
-        "baseline_nm": _numbers(loop.baseline),
-        "extended_nm": _numbers(loop.extended),
-    }
+def _loop(loop: LoopTrace, origin: float) -> shapes.LoopTraceOut:
+    return shapes.LoopTraceOut(
+        pressure_bar=loop.pressure / PASCALS_PER_BAR,
+        cycles=loop.cycles + origin,
+        frequency_hz=finite(loop.frequency),
+        speed_rpm=_numbers(loop.speed / RADIANS_PER_SECOND_PER_RPM),
+        measured_nm=_numbers(loop.measured),
+        baseline_nm=_numbers(loop.baseline),
+        extended_nm=_numbers(loop.extended),
+    )
 
 
 def _numbers(values: FloatArray) -> list[Any]:

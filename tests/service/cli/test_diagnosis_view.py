@@ -8,11 +8,12 @@ import pytest
 from rich.console import Console
 
 from models.diagnosis.campaign import Campaign
+from service.api.life import LifePrediction
 from service.cli.diagnose import shown
-from service.clutch.diagnosis.report import empty, public
+from service.clutch.diagnosis.report import EMPTY, public
 from tests.service.changes.stand_in_engine import diagnose
 
-LIFE = {"status": "predicted", "remaining_cycles": {"0.05": 4000.0, "0.5": 12345.6, "0.95": None}}
+LIFE: dict[str, Any] = {"remaining_cycles": {"0.05": 4000.0, "0.5": 12345.6, "0.95": None}}
 STATE = {"adoptable": True, "adopted": True}
 
 
@@ -27,8 +28,8 @@ def printed(report: dict[str, Any], *, colours: bool = False) -> str:
 @pytest.fixture
 def report() -> dict[str, Any]:
     diagnosed = diagnose(Campaign(), rng=None)  # type: ignore[arg-type]  # none is drawn without tests
-    after = LIFE | {"status": "reached"}
-    return public(diagnosed, origin=500.0, before=LIFE, after=after, notes=("left out",)) | STATE
+    before, after = (LifePrediction.model_construct(**LIFE | {"status": status}) for status in ("predicted", "reached"))
+    return public(diagnosed, origin=500.0, before=before, after=after, notes=("left out",)).model_dump() | STATE
 
 
 def test_all_that_matters_is_there(report: dict[str, Any]) -> None:
@@ -59,7 +60,7 @@ def test_the_maps_can_be_read_without_colours_and_a_report_without_them(report: 
     assert "\x1b[30;48;5;160m##" in printed(report, colours=True)
     report["maps"]["before"] = {"speed_pressure": [[None] * 3] * 2, "pressure_cycles": [[0.0] * 2] * 3}
     assert "·" in printed(report)
-    little = empty() | {"verdict": "insufficient_data", "summary": "Two tests."} | STATE | {"adopted": False}
+    little = EMPTY.model_dump() | {"verdict": "insufficient_data", "summary": "Two tests."} | STATE | {"adopted": False}
     assert "Too little data" in printed(little)
 
 

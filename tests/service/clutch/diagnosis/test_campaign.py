@@ -13,6 +13,7 @@ from models.diagnosis.campaign import Campaign, EventKind
 from models.diagnosis.design.design import build_design
 from models.diagnosis.explanations.verdict import Verdict
 from models.records.runs import Record
+from service.api.life import LifePrediction
 from service.clutch.diagnosis import campaign as campaign_module
 from service.clutch.diagnosis.campaign import DiagnosedLife, thinned
 from service.clutch.diagnosis.report import public
@@ -161,6 +162,6 @@ def test_the_plate_and_a_declared_filter_reach_the_diagnosis(client: TestClient,
 def test_an_end_that_adoption_takes_back_is_said_so(before: float, after: float, said: str) -> None:
     """From about 0 to about 880 cycles was all that was said."""
     found = replace(findings(Verdict.CAUSE_NAMED, "pressure_offset"), extension=cast("Any", object()))
-    lives = [{"remaining_cycles": {"0.5": median}} for median in (before, after)]
+    lives = [LifePrediction.model_construct(remaining_cycles={"0.5": median}) for median in (before, after)]
     answer = public(found, origin=0.0, before=lives[0], after=lives[1], notes=())
-    assert answer["summary"].endswith(said)
+    assert answer.summary.endswith(said)
