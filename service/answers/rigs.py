@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, get_args
+from typing import get_args
 
 import numpy as np
 
@@ -33,6 +33,7 @@ from service.clutch.incoming_run import IncomingRun, SampledChannels
 from service.clutch.items import fit_items, warned, warnings_of_file
 from service.errors import InvalidError
 from service.paging import Part, by_name
+from service.readers.preview import ShownColumn, ShownTable
 from service.readers.read_file import preview_file, read_file
 from service.readers.table import Reading
 from service.readers.unit_table import spellings
@@ -142,7 +143,7 @@ def preview(
     )
 
 
-def _with_stated(used: RigProfile | None, shown: Mapping[str, Any], reading: Reading) -> RigProfile | None:
+def _with_stated(used: RigProfile | None, shown: ShownTable, reading: Reading) -> RigProfile | None:
     """A profile with what the request says besides: marks, the decimal sign, its map."""
     if used is None:
         return None
@@ -161,17 +162,17 @@ def _clutch(database: Database, clutch_id: str | None) -> tuple[Geometry, float]
     return record.geometry.to_model(), record.torque_filter
 
 
-def _title(column: Mapping[str, Any]) -> str:
+def _title(column: ShownColumn) -> str:
     return f"{column['group']}/{column['name']}" if column["group"] else str(column["name"])
 
 
-def _first_of_each(columns: Sequence[Mapping[str, Any]]) -> list[int]:
+def _first_of_each(columns: Sequence[ShownColumn]) -> list[int]:
     """The indices of columns that have a title, the first of those of equal titles."""
     titles = [_title(column) if column["name"] else "" for column in columns]
     return [index for index, title in enumerate(titles) if title and titles.index(title) == index]
 
 
-def _fitting(database: Database, shown: Mapping[str, Any], filename: str) -> tuple[str | None, RigProfile | None]:
+def _fitting(database: Database, shown: ShownTable, filename: str) -> tuple[str | None, RigProfile | None]:
     """The one profile that has the file's columns; of several, the one whose pattern has the file's name."""
     titles = [_title(column) for column in shown["columns"] if column["name"]]
     with database.reading() as connection:
@@ -186,7 +187,7 @@ def _fitting(database: Database, shown: Mapping[str, Any], filename: str) -> tup
     return (fitting[0].name, fitting[0]) if len(fitting) == 1 else (None, None)
 
 
-def _by_titles(shown: Mapping[str, Any]) -> RigProfile | None:
+def _by_titles(shown: ShownTable) -> RigProfile | None:
     """The columns as their titles name them; None where no title is a channel's. A channel of two columns is left open."""
     channels = [column["channel"] for column in shown["columns"]]
     columns: dict[str, dict[str, object]] = {}
@@ -209,7 +210,7 @@ def _stated_without_column(reading: Reading) -> list[RigColumn]:
     ]
 
 
-def _column(column: Mapping[str, Any], profile: RigProfile | None) -> PreviewColumn:
+def _column(column: ShownColumn, profile: RigProfile | None) -> PreviewColumn:
     title = _title(column)
     profile_column = next((item for item in profile.columns if item.title == title), None) if profile else None
     channel = None if profile_column is None else profile_column.channel

@@ -9,7 +9,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from service.readers.arrays import Leaf, table_of
+from service.readers.arrays import Leaf, Tree, table_of
 from service.readers.limits import Limits
 from service.readers.table import Reading, Table
 
@@ -23,7 +23,7 @@ def read_table(path: Path, reading: Reading, limits: Limits) -> Table:
     return table_of(_folder(file, 0, [_MAX_OBJECTS]), reading, limits)
 
 
-def _folder(group: h5py.Group, depth: int, left: list[int]) -> dict[str, Any]:
+def _folder(group: h5py.Group, depth: int, left: list[int]) -> Tree:
     tree: dict[str, Any] = dict(group.attrs.items())
     for name in group:
         left[0] -= 1

@@ -15,7 +15,7 @@ import pyarrow.types as kinds  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
 from service.errors import MAX_QUOTED
-from service.readers.arrays import parsed, refuse_counts, stated_unit, unit_of_array
+from service.readers.arrays import Tree, parsed, refuse_counts, stated_unit, unit_of_array
 from service.readers.column_names import column_of
 from service.readers.limits import Limits
 from service.readers.meanings import known_channel
@@ -42,7 +42,7 @@ def read_table(path: Path, _: Reading, limits: Limits) -> Table:
     return Table(columns=tuple(columns), read=read)
 
 
-def _stated(metadata: Mapping[bytes, bytes] | None) -> dict[str, Any]:
+def _stated(metadata: Mapping[bytes, bytes] | None) -> Tree:
     """What the file says of its columns, as texts and folders, those of pandas' `attrs` among them."""
     stated: dict[str, Any] = {}
     for key, value in (metadata or {}).items():

@@ -1,7 +1,6 @@
 """A table for a person to look at: its first rows, and what each column is taken for, as JSON."""
 
-from dataclasses import asdict
-from typing import Any
+from typing import TypedDict
 
 from service.errors import MAX_QUOTED, InvalidError
 from service.readers.column_names import choices_of, column_of, understood
@@ -13,13 +12,35 @@ from service.readers.table import Reading, Table, labels
 _MAX_LINES = 50
 
 
-def preview(table: Table, reading: Reading) -> dict[str, Any]:
-    """The table and its columns.
+class ShownColumn(TypedDict):
+    """A column: its title, the units that the file and the caller's map state, the channel that it is taken for (None: left
+    out), and the unit that it is read in (None: not known)."""
 
-    `columns`: of each its `title`, the `unit` that the file states, the one `stated` by the caller's map, the `channel` that
-    it is taken for (null: left out), and the unit that it is `read_in` (null: not known). `problem` says why the columns
-    cannot be read so.
-    """
+    title: str
+    name: str
+    group: str
+    unit: str | None
+    stated: str | None
+    channel: str | None
+    read_in: str | None
+
+
+class ShownTable(TypedDict):
+    """A table's name and those of the others, the cells above it and what they say, its first rows, and its columns.
+    `problem` says why these cannot be read so."""
+
+    table: str
+    tables: list[str]
+    above: list[list[str]]
+    labels: dict[str, str]
+    first_line: int | None
+    head: list[list[str]]
+    columns: list[ShownColumn]
+    problem: str | None
+
+
+def preview(table: Table, reading: Reading) -> ShownTable:
+    """The table and its columns, read or not."""
     try:
         table, reading = widened(stacked_columns(with_constants(table, reading), reading), reading)
         constants(table, reading)
@@ -28,7 +49,7 @@ def preview(table: Table, reading: Reading) -> dict[str, Any]:
         chosen, errors = [], [error]
     by_index = {column.index: column for column in chosen}
     stated_in_map = {channel: column_of(choice.column).unit for channel, choice in choices_of(reading).items()}
-    columns = []
+    columns: list[ShownColumn] = []
     for index, column in enumerate(table.columns):
         chosen_here = by_index.get(index)
         columns.append(
@@ -51,5 +72,4 @@ def preview(table: Table, reading: Reading) -> dict[str, Any]:
         "head": [[cell[:MAX_QUOTED] for cell in row] for row in table.head],
         "columns": columns,
         "problem": errors[0].detail if errors else None,
-        "notices": [asdict(notice) for notice in table.notices],
     }

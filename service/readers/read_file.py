@@ -18,7 +18,7 @@ from service.readers.column_names import parse_map
 from service.readers.constants import value_of_part
 from service.readers.detect import Format, members, opened, sniff, unpacked
 from service.readers.limits import LIMITS, Limits
-from service.readers.preview import preview
+from service.readers.preview import ShownTable, preview
 from service.readers.suggest import Proposal, propose
 from service.readers.table import ALL, SHEETS, ColumnChoice, Reading, index_of_wanted
 from service.readers.text import read_text
@@ -46,11 +46,9 @@ def read_file(path: Path, *, filename: str, reading: Reading | None = None, limi
     return channels
 
 
-def preview_file(
-    path: Path, *, filename: str, reading: Reading | None = None, limits: Limits = LIMITS
-) -> dict[str, Any]:
+def preview_file(path: Path, *, filename: str, reading: Reading | None = None, limits: Limits = LIMITS) -> ShownTable:
     """The table as it is read, and what each column is taken for (`preview.preview`). Raises as `read_file` does."""
-    shown: dict[str, Any] = _read(path, filename, reading or Reading(), limits, "preview")
+    shown: ShownTable = _read(path, filename, reading or Reading(), limits, "preview")
     return shown
 
 

@@ -8,17 +8,6 @@ from tests.architecture.source import Module, by_name, none_of
 
 #: What reads the wire as it comes, with no library of the service: the command line and its client. And the rows <-> values.
 APART = ("service/cli/", "service/client/", "service/repository.py")
-#: Files that wait yet: those of the diagnosis' report, and what readers find in files. The list only shrinks.
-WAITING = frozenset(
-    {
-        "service/clutch/diagnosis/campaign.py",
-        "service/clutch/diagnosis/report.py",
-        "service/readers/hdf5.py",
-        "service/readers/parquet.py",
-        "service/readers/preview.py",
-        "service/readers/read_file.py",
-    }
-)
 
 
 def untyped(module: Module) -> Iterator[str]:
@@ -37,9 +26,5 @@ def untyped(module: Module) -> Iterator[str]:
 
 def test_no_signature_of_the_service_is_a_dict_of_anything() -> None:
     modules = [each for each in by_name().values() if each.shown.startswith("service/")]
-    found = {each.shown: list(untyped(each)) for each in modules if not each.shown.startswith(APART)}
-    wrong = [place for shown, places in found.items() if shown not in WAITING for place in places]
-    none_of(wrong, "signatures with dict[str, Any]:")
-    none_of(
-        sorted(shown for shown in WAITING if not found.get(shown)), "files that no longer wait: take them off WAITING"
-    )
+    found = [place for each in modules if not each.shown.startswith(APART) for place in untyped(each)]
+    none_of(found, "signatures with dict[str, Any]:")

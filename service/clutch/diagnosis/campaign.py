@@ -105,13 +105,13 @@ class Moment(TypedDict):
     moment: float | None
 
 
-class RunHead(Moment):
+class TestHead(Moment):
     """What every test has."""
 
     run_id: str
 
 
-def head_of(run: IncomingRun, origin: float) -> RunHead:
+def head_of(run: IncomingRun, origin: float) -> TestHead:
     """Name and moment of a test, its cycles counted from `origin`."""
     return {"run_id": run.run_id, **_when(run, origin)}
 
