@@ -1,13 +1,28 @@
-"""The array type of the numerics, 64-bit floats throughout, and the check of the plain numbers beside arrays."""
+"""The array type of the numerics, 64-bit floats throughout, the check of plain numbers beside arrays, and arrays as keys."""
 
 import math
 from collections.abc import Iterable
-from typing import TypeAlias
+from typing import Generic, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 FloatArray: TypeAlias = NDArray[np.float64]
+Value = TypeVar("Value")
+
+
+class Same(Generic[Value]):
+    """A value that equals only itself, as a key: what is computed of an array again and again is found without comparing its
+    numbers. None may change it."""
+
+    def __init__(self, value: Value) -> None:
+        self.value = value
+
+    def __hash__(self) -> int:
+        return id(self.value)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Same) and self.value is other.value
 
 
 def require_finite(owner: object, names: Iterable[str], *, positive: bool = False) -> None:

@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from models.arrays import FloatArray
+from models.arrays import FloatArray, Same
 
 #: Waves over speed, the fewer that change with pressure and with life, waves over pressure and over life, at most. Of the
 #: highest the weight is below 1e-4 on ranges up to six in ln v.
@@ -56,19 +56,6 @@ class LawSizes(NamedTuple):
 EXACT = LawSizes(0.0, 0.0, 0.0)
 
 
-class _Same:
-    """Values that are equal only to themselves: what is kept of them is found without comparing them."""
-
-    def __init__(self, values: FloatArray) -> None:
-        self.values = values
-
-    def __hash__(self) -> int:
-        return id(self.values)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Same) and self.values is other.values
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LawForm:
     """The functions of which δ is a sum, on the ranges that a campaign measured."""
@@ -93,7 +80,7 @@ class LawForm:
 
     def shares(self, velocity: FloatArray, pressure: FloatArray, cycles: FloatArray) -> FloatArray:
         """∂δ/∂coefficient [n, k] at velocity [n] m/s, pressure [n] Pa and cycles [n]."""
-        moved, high, gone = self._places(_Same(pressure), _Same(cycles))
+        moved, high, gone = self._places(Same(pressure), Same(cycles))
         form = self._form(self._speed(velocity, moved))
         over_pressure = _waves(high, self._of_pressure, _LAW_LENGTH)[:, 1:]
         over_life = _waves(gone, self._of_life, _LAW_LENGTH)[:, 1:]
@@ -107,14 +94,19 @@ class LawForm:
     ) -> FloatArray:
         """δ [n] for coefficients [k]: as `shares` has it, by tables of its functions (error below 0.2 % of the highest
         wave)."""
-        known = coefficients.tobytes()
-        moved, alone, factors = self._beside_speed(known, _Same(pressure), _Same(cycles))
-        over_speed = _between(self._tables(known)[0], self._speed(velocity, moved))
+        return self._share(coefficients.tobytes(), Same(velocity), Same(pressure), Same(cycles))
+
+    @lru_cache(maxsize=8)  # noqa: B019 - as below; effects ask for it at a campaign's own speeds over and over
+    def _share(
+        self, coefficients: bytes, velocity: Same[FloatArray], pressure: Same[FloatArray], cycles: Same[FloatArray]
+    ) -> FloatArray:
+        moved, alone, factors = self._beside_speed(coefficients, pressure, cycles)
+        over_speed = _between(self._tables(coefficients)[0], self._speed(velocity.value, moved))
         return np.asarray(alone + np.einsum("nk,nk->n", over_speed, factors), dtype=np.float64)
 
     @lru_cache(maxsize=8)  # noqa: B019 - as below
     def _beside_speed(
-        self, coefficients: bytes, pressure: "_Same", cycles: "_Same"
+        self, coefficients: bytes, pressure: Same[FloatArray], cycles: Same[FloatArray]
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """By what share of itself velocity [n] moves, f + g [n], and by what each function of speed is multiplied [n, m]:
         h by 1, h' by its waves over pressure, h'' by the life."""
@@ -126,11 +118,13 @@ class LawForm:
         return moved, of_pressure[:, 0] + _at(gone, over_life), factors
 
     @lru_cache(maxsize=8)  # noqa: B019 - the few points of a campaign, at which effects are tried over and over
-    def _places(self, pressure: "_Same", cycles: "_Same") -> tuple[FloatArray, FloatArray, FloatArray]:
+    def _places(
+        self, pressure: Same[FloatArray], cycles: Same[FloatArray]
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """By what share of itself velocity [n] moves, and places [n] within 0 ... 1 along pressure and √life."""
-        high = (pressure.values - self.lowest) / max(self.highest - self.lowest, 1e-300)
+        high = (pressure.value - self.lowest) / max(self.highest - self.lowest, 1e-300)
         high = np.clip((high + MARGIN) / (1.0 + 2.0 * MARGIN), 0.0, 1.0)
-        gone = np.sqrt(np.clip((cycles.values - self.first) / max(self.last - self.first, 1.0), 0.0, 1.0))
+        gone = np.sqrt(np.clip((cycles.value - self.first) / max(self.last - self.first, 1.0), 0.0, 1.0))
         return np.exp(-_at(high, self.moved_by_pressure) - _at(gone, self.moved_by_life)), high, gone
 
     def _speed(self, velocity: FloatArray, moved: FloatArray) -> FloatArray:

@@ -14,14 +14,16 @@ stays at the oil's temperature leaves nothing of this effect. The viscous term m
 """
 
 import math
+from functools import lru_cache
 
 import numpy as np
 from scipy.constants import zero_Celsius
 
-from models.arrays import FloatArray
+from models.arrays import FloatArray, Same
 from models.diagnosis import criteria
 from models.diagnosis.baseline.laws import Scene
 from models.diagnosis.campaign import Oil
+from models.diagnosis.design.design import Points
 from models.diagnosis.design.facts import Facts
 from models.diagnosis.effects.effect import (
     Discrepancy,
@@ -57,7 +59,12 @@ def viscosity(temperature: FloatArray, oil: Oil) -> FloatArray:
 
 def log_viscosity_ratio(temperature: FloatArray, reference: float, oil: Oil) -> FloatArray:
     """ln ν(T)/ν(reference) [n]; 0 where the temperature [n] K was not measured (NaN)."""
-    measured = np.where(np.isfinite(temperature), temperature, reference)
+    return _log_viscosity_ratio(Same(temperature), reference, oil)
+
+
+@lru_cache(maxsize=8)  # the few points of a campaign, at which effects are tried over and over
+def _log_viscosity_ratio(temperature: Same[FloatArray], reference: float, oil: Oil) -> FloatArray:
+    measured = np.where(np.isfinite(temperature.value), temperature.value, reference)
     return np.asarray(np.log(viscosity(measured, oil) / viscosity(np.array([reference]), oil)), dtype=np.float64)
 
 
@@ -74,9 +81,14 @@ def _oil_temperature_grid(facts: Facts) -> tuple[Tried, ...]:
     return tuple(Tried(shape=(share, late)) for share in shares for late in STARTS)
 
 
+@lru_cache(maxsize=8)  # the laws change about a film more often than its settling time does
+def _film(log_viscosity: Same[FloatArray], points: Same[Points], settling: float) -> FloatArray:
+    return followed(log_viscosity.value, points.value, settling)
+
+
 def _oil_temperature_change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
     measured = log_viscosity_ratio(scene.points.temperature, scene.facts.reference_temperature, scene.facts.oil)
-    logs = followed(measured, scene.points, math.exp(shape[1]))
+    logs = _film(Same(measured), Same(scene.points), math.exp(shape[1]))
     exponent = np.clip(amplitude * logs, -5.0, 5.0)
     m_s, m_c, v_s, _ = scene.parameters.T
     later = np.exp(-np.minimum(v_s * np.exp(np.clip(shape[0] * exponent, -3.0, 3.0)) / scene.points.velocity, 700.0))
