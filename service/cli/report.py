@@ -35,7 +35,7 @@ def report(
     out_folder: Annotated[Path, typer.Option("--out", help="The folder to write to")] = Path(),
     pdf: Annotated[bool, typer.Option("--pdf", help="Print each clutch's page too, by Chromium or Chrome")] = False,
     to: Annotated[str | None, typer.Option(help="Send the files there: a web address, or one of Apprise")] = None,
-    every: Annotated[float | None, typer.Option(min=0.01, help="Hours between two reports, until Ctrl-C")] = None,
+    every: Annotated[float | None, typer.Option(min=0.001, help="Hours between two reports, until Ctrl-C")] = None,
     times: Annotated[int | None, typer.Option(min=1, help="With --every, end after this number of reports")] = None,
 ) -> None:
     """Write a report: clutches and alarms as XLSX, with --pdf a page for each clutch."""

@@ -30,7 +30,7 @@ def test_clutches_and_alarms_are_in_a_workbook_which_a_receiver_gets_on_a_schedu
     server.http.post("/v1/clutches", json={"clutch_id": "waiting"}).raise_for_status()
     with receiving() as receiver:
         where = ("--out", str(tmp_path / "a"), "--url", server.url, "--to", receiver.url)
-        done = clutchlife("report", *where, "--every", "0.01", "--times", "2")
+        done = clutchlife("report", *where, "--every", "0.001", "--times", "2")
         assert (done.returncode, done.stderr) == (0, "")
         (path,) = {Path(line) for line in done.stdout.split()}
         (_, headers, body), again = receiver.requests
@@ -53,7 +53,7 @@ def test_a_report_that_fails_is_tried_again_at_the_next_time_or_ends_the_command
     with receiving() as receiver:
         receiver.status = 503
         options = ("report", "--out", str(tmp_path), "--url", server.url, "--to", receiver.url)
-        once, twice = clutchlife(*options), clutchlife(*options, "--every", "0.01", "--times", "2")
+        once, twice = clutchlife(*options), clutchlife(*options, "--every", "0.001", "--times", "2")
     assert once.returncode != 0
     assert "the receiver answered 503" in once.stderr
     assert twice.returncode == 0

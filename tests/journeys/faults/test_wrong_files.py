@@ -116,6 +116,7 @@ def test_a_gzip_bomb(service: Watched, kind: str, tmp_path: Path) -> None:
     assert "must not unpack to more than" in problem["detail"] or "must not have more than" in problem["detail"]
 
 
+@pytest.mark.slow
 def test_an_archive_and_a_table_of_words(service: Watched) -> None:
     packed = BytesIO()
     with zipfile.ZipFile(packed, "w") as archive:

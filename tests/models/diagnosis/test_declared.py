@@ -17,7 +17,6 @@ from models.friction.stribeck import torque
 from models.records.runs import Plateaus, Record
 from models.records.torque_filter import filtered_as_torque
 from tests.models.diagnosis.campaigns import Where, altered, campaign, look, scene_of
-from tests.support import one_quick
 
 # --- The torque channel's own low-pass: named as a delay where it is not declared, taken off and not discovered where
 # it is.
@@ -44,7 +43,8 @@ def hidden(seed: int, declared: float) -> Campaign:
     return replace(given, dynamic=tests)
 
 
-@pytest.mark.parametrize(("seed", "declared"), one_quick([(1, 0.0), (2, 0.0), (7, 0.0), (7, 0.5 * FILTER)]))
+@pytest.mark.parametrize(("seed", "declared"), [(1, 0.0), (2, 0.0), (7, 0.0), (7, 0.5 * FILTER)])
+@pytest.mark.slow
 def test_what_is_left_beyond_the_declared_filter_is_what_is_found(seed: int, declared: float) -> None:
     report = look(hidden(seed, declared))
     assert report.causes == (SLUG,)

@@ -89,6 +89,7 @@ def test_without_oil_temperature_neither_it_nor_a_zero_is_named_for_the_other(sl
         assert report.verdict is Verdict.CAUSE_AMBIGUOUS or not other & set(report.causes)
 
 
+@pytest.mark.slow
 def test_one_state_is_enough_for_what_happens_within_a_test() -> None:
     assert look(campaign(8, cycles=(0.0,))).verdict is Verdict.MODEL_ADEQUATE
     report = look(campaign(8, PLANTED["inertia_torque"], cycles=(0.0,)))
@@ -165,6 +166,7 @@ def test_nine_of_ten_plain_campaigns_are_adequate() -> None:
     assert verdicts.count(Verdict.MODEL_ADEQUATE) >= 9
 
 
+@pytest.mark.slow
 def test_a_loud_heating_is_at_work_though_its_screen_leads_to_a_slow_one() -> None:
     """Without loops what its form leaves may be another cause's beside it."""
     report = look(rehearsal(5, {"interface_heating": 15.0}, dynamic=False, tests=6), 1)

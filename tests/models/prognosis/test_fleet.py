@@ -112,6 +112,7 @@ def scored(prior: FleetPrior, seed: int, count: int) -> float:
     return float(both[1] / both[0])
 
 
+@pytest.mark.slow
 def test_a_fleet_of_the_same_kind_helps_and_another_kind_does_little_harm() -> None:
     ratio = {scale: scored(fleet(8, 5, scale), 6, 12) for scale in (5000.0, 40_000.0)}
     assert ratio[5000.0] < 0.75

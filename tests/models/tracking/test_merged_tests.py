@@ -15,6 +15,7 @@ from models.tracking.posterior import TrackPosterior
 from models.tracking.prior import TrackPrior, weak
 from models.tracking.sampling import spread_normals, spread_points, with_linear_terms
 from tests.models.tracking.tracked_series import sent
+from tests.support import one_quick
 
 #: By how much the probability below a quantile may change, in the median of all looked at and in nine of ten: on more
 #: laws and lives of 300 and 1,000 tests it is 0.01 to 0.02, and 0.03 to 0.07 (docs/appendix/scale.md, one life).
@@ -95,7 +96,7 @@ def below(sample: np.ndarray, weight: np.ndarray, at: float) -> float:
     return 0.5 * float(weight[sample < at].sum() + weight[sample <= at].sum())
 
 
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", one_quick(LAWS))
 def test_quantiles_of_coefficients_and_of_remaining_life_are_those_of_all_tests(law: str) -> None:
     changes = []
     for tests, seed in ((300, 1), (300, 2), (1_000, 3)):

@@ -34,6 +34,7 @@ def require_kept_as_stored(*databases: Database) -> None:
         assert str(own_levels) == str({name: levels[name] for name in own_levels})
 
 
+@pytest.mark.slow
 def test_runs_and_changes_of_any_kind_are_seen_by_every_process(bench: Bench) -> None:
     """The second database stands for another process: it never stores, and looks after every step or after several."""
     with closing(open_database(bench.database.url)) as other, closing(open_database(bench.database.url)) as late:

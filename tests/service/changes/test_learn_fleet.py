@@ -151,6 +151,7 @@ def test_lives_that_ended_calibrate_the_next(url: str, monkeypatch: pytest.Monke
         assert planned["remaining_cycles"]["0.5"] == pytest.approx(after["remaining_cycles"]["0.5"], rel=1e-3)
 
 
+@pytest.mark.slow
 def test_an_end_has_its_own_kind_learn_and_goes_before_the_rest_of_another(
     in_file: Database, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -12,7 +12,7 @@ from service.answers.verification import check_results
 from storage.engine.opening import open_database
 from tests.plausibility.bench import with_gain
 from tests.service.clients import post_run
-from tests.support import stationary
+from tests.support import one_quick, stationary
 
 CLUTCH = "/v1/clutches/c1"
 #: The tests before friction falls by a fifth, and after.
@@ -34,7 +34,7 @@ def warned(answer: dict[str, Any]) -> list[str]:
     return [warning["message"] for warning in answer["warnings"] if warning["code"] == "new_level"]
 
 
-@pytest.mark.parametrize("share", [0.8, 0.5, 1.5])
+@pytest.mark.parametrize("share", one_quick([0.8, 0.5, 1.5]))
 def test_the_second_test_of_a_new_level_is_the_present(client: TestClient, share: float) -> None:
     """One may be another clutch's and is held; with two the forecast goes on from there, and says so. Friction that falls by
     half and one that rises by half, as that of a clutch that was rebuilt and nobody said so, are levels as any other."""
@@ -52,6 +52,7 @@ def test_the_second_test_of_a_new_level_is_the_present(client: TestClient, share
     assert "since the test at 9,000 cycles" in warned(life(client))[0]
 
 
+@pytest.mark.slow
 def test_the_order_of_arrival_does_not_matter_to_a_new_level(client: TestClient) -> None:
     sent(client, reversed(AFTER), 0.8)
     sent(client, BEFORE)

@@ -57,6 +57,7 @@ def curved_pressure(at: Where) -> np.ndarray:
     return np.asarray(-0.24 * x * (x - 1) * torque(at.velocity, at.parameters), dtype=np.float64)
 
 
+@pytest.mark.slow
 def test_a_curved_pressure_law_is_the_laws_and_no_hysteresis_where_nothing_was_ever_lowered() -> None:
     report = look(campaign(3, curved_pressure, noise=0.004, gain=0.001, loops=False), 1)
     assert report.verdict is Verdict.MODEL_ADEQUATE

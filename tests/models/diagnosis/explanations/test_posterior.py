@@ -183,13 +183,14 @@ def test_a_logged_oil_change_is_likelier_than_a_temperature_that_nobody_measured
     assert report.candidates[0].probability > 0.6
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_without_a_thermometer_an_oil_change_that_nobody_logged_may_be_warmer_oil() -> None:
     report = look(campaign(5, fresh, temperature=False), 0)
     assert report.verdict is Verdict.CAUSE_AMBIGUOUS
     assert set(report.causes) >= {"oil_change", "oil_temperature"}
 
 
+@pytest.mark.slow
 def test_gains_that_scatter_are_no_evidence_of_a_temperature() -> None:
     """Whatever size of them the noise was given; the control: a temperature is."""
     given = study(campaign(5, temperature=False, gain=0.005))
@@ -209,6 +210,7 @@ def test_what_stands_beside_a_certain_cause_was_refitted() -> None:
     assert standing[0] in posterior.nodes
 
 
+@pytest.mark.slow
 def test_a_loud_cause_is_refitted_however_little_its_screen_promised() -> None:
     """Heating by a quarter, and the law's form has absorbed half of it; without loops all of it, for nothing but the form of
     the curve shows it there."""
@@ -224,6 +226,7 @@ def test_a_loud_cause_is_refitted_however_little_its_screen_promised() -> None:
     assert swept.probabilities.get(heating, 0.0) < SURE
 
 
+@pytest.mark.slow
 def test_a_loud_cause_is_found_where_the_laws_form_has_bent_the_baseline() -> None:
     """Inertia of 2 Nm in three states: the law's form goes as far as its sizes allow, and from there the refit with inertia
     ends 800 nats behind, and behind a film that is not there."""
@@ -235,6 +238,7 @@ def test_a_loud_cause_is_found_where_the_laws_form_has_bent_the_baseline() -> No
     assert inertia.fit.effects[0].amplitude == pytest.approx(0.012, rel=0.05)
 
 
+@pytest.mark.slow
 def test_an_unmeasured_temperature_competes_under_the_scatter_of_gains_that_nothing_has() -> None:
     """Friction that recovers in rests passes for gains that scatter; about that baseline a temperature explains nothing."""
     hidden = hide((404, 3894774685, 2), ("rest_recovery",), 300.0, loops=True)

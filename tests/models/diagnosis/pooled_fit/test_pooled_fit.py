@@ -18,6 +18,7 @@ from models.diagnosis.pooled_fit.projection import RunScatter, gram_of, law_torq
 from tests.blind.rig.hide import hide
 from tests.blind.rig.sent import campaign as sent
 from tests.models.diagnosis.campaigns import Study, campaign, of_size, rehearsal, start_of, study
+from tests.support import one_quick
 
 # --- A fit says how it ended: converged, without a step that lowers the cost, out of steps, without a finite cost.
 
@@ -50,7 +51,7 @@ def test_a_fit_says_how_it_ended(given: Study) -> None:
     assert np.isinf(broken.cost)
 
 
-@pytest.mark.parametrize(("seed", "log_settling"), [(404, -5.0), (502, 1.7)])
+@pytest.mark.parametrize(("seed", "log_settling"), one_quick([(404, -5.0), (502, 1.7)]))
 def test_a_refit_comes_back_from_a_baseline_whose_viscous_torque_is_negative(seed: int, log_settling: float) -> None:
     """Heating by more than a third of the torque bends the curves so far that the baseline alone follows with C_v < 0; about
     such curves the screen may take it for slow."""

@@ -223,7 +223,7 @@ def test_loops_of_noise_are_no_evidence(rate: float) -> None:
         assert found(campaign([], records)) == {}
 
 
-@pytest.mark.parametrize(("frequency", "rate"), [(0.05, 50.0), (0.1, 100.0), (0.1, 200.0)])
+@pytest.mark.parametrize(("frequency", "rate"), one_quick([(0.05, 50.0), (0.1, 100.0), (0.1, 200.0)]))
 def test_torque_that_turns_with_the_clutch_is_no_ripple(frequency, rate, monkeypatch):
     """It jumps at the same angle of the shaft in every swing: taken as they are, records that reverse show a ripple of
     half a newton metre and more."""

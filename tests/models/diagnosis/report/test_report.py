@@ -111,6 +111,7 @@ def test_why_an_extension_is_not_proposed_is_said(given: Study) -> None:
 # --- Which causes a campaign could tell apart, from its design alone.
 
 
+@pytest.mark.slow
 def test_sweeps_without_a_thermometer_tell_some_causes_apart() -> None:
     sweeps = look(campaign(3, loops=False, temperature=False), 0, isolability=True).isolability
     # a drag and a shifted zero are parted by an open clutch
