@@ -1,13 +1,19 @@
 """Logs: one line a record, JSON for programs or text for a terminal, with the id of the request that it belongs to.
 
+A thread writes the lines: where nobody reads them, or the disk is full, only the log waits.
+
 No line can be forged: what comes from outside (ids, addresses, the texts of errors) never begins one. In JSON a line break
 is escaped; in text all but the first line of a record begin with a bar, and other control characters are escaped.
 """
 
 import json
 import logging
+import os
 import re
 import sys
+import threading
+import time
+from collections import deque
 from contextvars import ContextVar
 from datetime import UTC, datetime
 from typing import Any, Literal, TextIO
@@ -22,6 +28,13 @@ request_id: ContextVar[str] = ContextVar("request_id", default="")
 _OWN = ("clutchlife", "uvicorn")
 _SANE = re.compile(rb"[!-~]{1,128}")
 _CONTINUED = "\n    | "
+#: Bytes of lines that wait for who takes them, at most. Chosen: a minute of 200 requests a second, and little beside what a
+#: process holds.
+MAX_WAITING_BYTES = 4 << 20
+#: [s] A process that ends waits so long for the next line to be taken. Chosen: `docker stop` waits 10 s for all of a stop.
+FLUSH_SECONDS = 2.0
+#: [s] After which a line that could not be written is tried again.
+RETRY_SECONDS = 0.1
 #: A line a request.
 access = logging.getLogger("clutchlife.access")
 #: What an operator must know of a start, whatever is chosen to be logged later: who may ask, what is misspelt.
@@ -40,10 +53,8 @@ def configure(form: LogFormat, level: LogLevel, stream: TextIO | None = None) ->
     """
     written = sys.stderr if stream is None else stream
     plain = form == "text" or (form == "auto" and written.isatty())
-    handler = logging.StreamHandler(written)
-    handler.setFormatter(TextLines() if plain else JsonLines())
     root = logging.getLogger()
-    root.handlers[:] = [handler]
+    root.handlers[:] = [Queued(written, TextLines() if plain else JsonLines())]
     lowest = logging.getLevelNamesMapping()[level.upper()]
     root.setLevel(max(lowest, logging.WARNING))
     for name in _OWN:
@@ -63,6 +74,73 @@ def log_request(level: int, method: str, route: str, status: int, seconds: float
         "key": key,
     }
     access.log(level, "%s %s %s", method, route, status, extra={"fields": fields})
+
+
+class Queued(logging.Handler):
+    """Has a thread write lines to a stream's file, in their order, so that nobody waits for whoever takes them.
+
+    Lines beyond `most` bytes that wait are dropped. How many were is a line in their place.
+    """
+
+    def __init__(self, stream: TextIO, form: logging.Formatter, most: int = MAX_WAITING_BYTES) -> None:
+        super().__init__()
+        self.setFormatter(form)
+        self._file, self._encoding, self._most = stream.fileno(), stream.encoding, most
+        self._lines: deque[bytes | int] = deque()  # a number: so many were dropped here
+        self._waiting = self._written = 0  # bytes
+        self._changed = threading.Condition()
+        threading.Thread(target=self._write_all, name="log", daemon=True).start()
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Queue a record's line."""
+        line = self._encoded(record)
+        with self._changed:
+            if self._waiting + len(line) <= self._most:
+                self._lines.append(line)
+                self._waiting += len(line)
+            elif self._lines and isinstance(self._lines[-1], int):
+                self._lines[-1] += 1
+            else:
+                self._lines.append(1)
+            self._changed.notify_all()
+
+    def flush(self) -> None:
+        """Wait until all is written, or for some seconds nothing was taken. `logging.shutdown` calls it."""
+        with self._changed:
+            while self._waiting:
+                before = self._written
+                if not self._changed.wait_for(lambda: self._written != before, FLUSH_SECONDS):  # noqa: B023
+                    return
+
+    def _encoded(self, record: logging.LogRecord) -> bytes:
+        return (self.format(record) + "\n").encode(self._encoding, "backslashreplace")
+
+    def _write_all(self) -> None:
+        while True:
+            with self._changed:
+                self._changed.wait_for(lambda: self._lines)
+                line = self._lines.popleft()
+                if isinstance(line, int):
+                    line = self._encoded(_of_dropped(line))
+                    self._waiting += len(line)
+            rest = memoryview(line)
+            while rest:
+                try:
+                    # past Python's own buffer, which would be locked while nobody takes the line, at the process's end too
+                    taken = os.write(self._file, rest)
+                except OSError:  # as where the disk is full
+                    time.sleep(RETRY_SECONDS)
+                    continue
+                rest = rest[taken:]
+                with self._changed:
+                    self._waiting -= taken
+                    self._written += taken
+                    self._changed.notify_all()
+
+
+def _of_dropped(number: int) -> logging.LogRecord:
+    message = "%d lines of the log were dropped here: nobody took them"
+    return logging.LogRecord("clutchlife", logging.WARNING, __file__, 0, message, (number,), None)
 
 
 class JsonLines(logging.Formatter):

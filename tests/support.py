@@ -28,6 +28,7 @@ import numpy as np
 import pytest
 
 from service.jobs import process
+from service.logging import LogLevel
 from tests.storage.samples import lay_empty
 
 
@@ -228,22 +229,29 @@ class Server:
 
     `database`: the path of a file, or an address.
 
-    `environment`: variables beside those of the tests.
+    `environment`: variables beside those of the tests. `log`: the least level of a line, and where lines go (None: as here)
+    unless it is forked.
     """
 
     def __init__(
-        self, database: Path | str, *, loaded: bool = False, environment: Mapping[str, str] | None = None
+        self,
+        database: Path | str,
+        *,
+        loaded: bool = False,
+        environment: Mapping[str, str] | None = None,
+        log: tuple[LogLevel, int | None] = ("warning", None),
     ) -> None:
         self.database = database
         self.address = database if isinstance(database, str) else f"sqlite:///{database}"
         self.port = free_port()
         self.loaded = loaded
         self.environment = dict(environment or {})
+        self.log_level, self.log_to = log
         self.url = f"http://127.0.0.1:{self.port}"
         self.process: subprocess.Popen[bytes] | BaseProcess | None = None
 
     def start(self) -> None:
-        arguments = ["serve", "--port", str(self.port), "--log-level", "warning"]
+        arguments = ["serve", "--port", str(self.port), "--log-level", self.log_level]
         arguments += ["--database", self.address]
         environment = os.environ | self.environment
         if self.loaded:
@@ -254,7 +262,8 @@ class Server:
             self.process = _LOADED.Process(target=_run, args=(arguments, environment), daemon=True)
             self.process.start()
         else:
-            self.process = subprocess.Popen([sys.executable, "-m", "service.cli.main", *arguments], env=environment)
+            command = [sys.executable, "-m", "service.cli.main", *arguments]
+            self.process = subprocess.Popen(command, env=environment, stderr=self.log_to)
         wait_until_ready(self.url, lambda: self.exit_code() is not None)
 
     @cached_property
@@ -290,10 +299,14 @@ class Server:
 
 @contextmanager
 def serving(
-    database: Path | str, *, loaded: bool = False, environment: Mapping[str, str] | None = None
+    database: Path | str,
+    *,
+    loaded: bool = False,
+    environment: Mapping[str, str] | None = None,
+    log: tuple[LogLevel, int | None] = ("warning", None),
 ) -> Iterator[Server]:
     """A running service on that database, stopped at the end whatever happens."""
-    server = Server(database, loaded=loaded, environment=environment)
+    server = Server(database, loaded=loaded, environment=environment, log=log)
     try:
         server.start()
         yield server

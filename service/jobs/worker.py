@@ -10,6 +10,7 @@ import time
 import traceback
 from collections.abc import Callable
 from contextlib import suppress
+from logging import shutdown
 from multiprocessing.connection import Connection
 from typing import Any
 
@@ -80,6 +81,7 @@ def main(
                 send(answer)
             except (TypeError, AttributeError, ValueError, pickle.PicklingError) as error:
                 send((None, RuntimeError(f"the result cannot be sent: {error}")))
+    shutdown()  # what was logged is written: a forked process ends without Python's own end
 
 
 def _answered(database: Database, message: bytes) -> tuple[Any, BaseException | None]:

@@ -1,9 +1,11 @@
 """The application of one service, made ready to answer; and several services at one port, each in a process of its own."""
 
 import gc
+import multiprocessing
 import os
 import signal
 import socket
+import sys
 import tempfile
 from collections.abc import Callable
 from contextlib import suppress
@@ -38,6 +40,18 @@ def prepared(settings: Settings) -> FastAPI:
     return app
 
 
+class _OneOfSeveral(uvicorn.Config):
+    """The configuration in each of several processes, which is asked to prepare the log before anything else."""
+
+    def configure_logging(self) -> None:
+        """Log as the settings say, and end by Python's own end, which writes what was logged last."""
+        super().configure_logging()
+        if multiprocessing.parent_process() is not None:
+            settings = Settings.from_environment()
+            configure(settings.log_format, settings.log_level)
+            signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
+
+
 class _Server(uvicorn.Server):
     """A server that calls `announce` once it answers."""
 
@@ -65,7 +79,7 @@ def serve_several(settings: Settings, processes: int, sockets: list[socket.socke
     """Serve in so many processes, which share the port; one that ends is replaced. Whether all could start."""
     settings.to_environment()
     application = f"{__name__}:{one_of_several.__name__}"
-    config = uvicorn.Config(
+    config = _OneOfSeveral(
         application,
         factory=True,
         http="service.cli.serving.bounded_protocol:PROTOCOL",
@@ -83,6 +97,5 @@ def serve_several(settings: Settings, processes: int, sockets: list[socket.socke
 def one_of_several() -> FastAPI:
     """The application in one of the processes, which end with their parent however that ends."""
     settings = Settings.from_environment()
-    configure(settings.log_format, settings.log_level)
     end_with_parent(partial(os.kill, os.getpid(), signal.SIGTERM))
     return prepared(settings)
