@@ -108,7 +108,7 @@ class Bodies:
             Takes.SHORT: Bound(short, short),
             Takes.RUN: Bound(most, limits.MAX_BYTES_IN_MEMORY),
             Takes.PHOTOGRAPH: Bound(most, most),
-            Takes.FILE: Bound(most_file, 0),
+            Takes.FILE: Bound(most_file, limits.PIECE_BYTES),
         }
         self.rooms = {"memory": Room(limits.MAX_BODIES_IN_MEMORY), "disk": Room(2 * max(most, most_file))}
         self.seconds = seconds

@@ -13,19 +13,20 @@ from concurrent.futures import Future
 from contextlib import AbstractAsyncContextManager, asynccontextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, Any, BinaryIO
+from typing import IO, Any, BinaryIO, cast
 
 from fastapi import Request
 from fastapi.concurrency import contextmanager_in_threadpool, run_in_threadpool
 from fastapi.responses import Response, StreamingResponse
-from starlette.datastructures import UploadFile
+from starlette.datastructures import FormData, UploadFile
+from starlette.formparsers import MultiPartException, MultiPartParser
 from starlette.types import Receive, Scope, Send
 
 from service.api.rig import RigProfile
-from service.errors import BusyError, InvalidError
+from service.errors import BusyError, InvalidError, TooLargeError
 from service.runs.rig_profile import require_usable
 from service.web.bodies import Room, parsed
-from service.web.limits import COPIES_SHARE, MAX_BYTES_IN_MEMORY, PIECE_BYTES
+from service.web.limits import COPIES_SHARE, MAX_BYTES_IN_MEMORY, MAX_FORM_TEXT_BYTES, PIECE_BYTES
 
 FILE_TYPE = "application/octet-stream"
 #: A file of any format, as the API's description has it, and as the body of a request.
@@ -100,17 +101,49 @@ async def received(request: Request, path: Path, filename: str) -> tuple[str, Ri
         async with opened(path, "wb") as file:
             await written(request.stream(), file)
         return filename, None
-    async with request.form(max_files=1, max_fields=8) as form:
-        sent = next((part for part in form.values() if isinstance(part, UploadFile)), None)
-        if sent is None:
-            raise InvalidError("the form must have exactly one file")
-        async with opened(path, "wb") as file:
-            await written(_pieces_of(sent), file)
-        text = form.get("profile")
-        profile = await parsed(RigProfile, text.encode()) if isinstance(text, str) else None
+    async with opened(path, "wb") as file:
+        form = await _Form(request, file).parse()
+    sent = next((part for part in form.values() if isinstance(part, UploadFile)), None)
+    if sent is None:
+        raise InvalidError("the form must have exactly one file, a field with a file name")
+    text = form.get("profile")
+    profile = await parsed(RigProfile, text.encode()) if isinstance(text, str) else None
     if profile is not None:
         require_usable(profile)
     return sent.filename or filename, profile
+
+
+class _Form(MultiPartParser):
+    """A form of one file and of a few texts: the file is written as it arrives, the texts are in memory."""
+
+    def __init__(self, request: Request, file: IO[bytes]) -> None:
+        super().__init__(request.headers, request.stream(), max_files=1, max_fields=8)
+        self._file = file
+        self._text_bytes = 0
+
+    def on_headers_finished(self) -> None:
+        """Have a file's bytes go to the disk, where the parser would hold the first MiB and then use the system's folder."""
+        super().on_headers_finished()
+        if (sent := self._current_part.file) is not None:
+            sent.file.close()
+            sent.file = cast("BinaryIO", self._file)
+
+    def on_part_data(self, data: bytes, start: int, end: int) -> None:
+        """Take what has arrived of a part. Raises TooLargeError where the texts become too long."""
+        if self._current_part.file is None:
+            self._text_bytes += end - start
+            if self._text_bytes > MAX_FORM_TEXT_BYTES:
+                raise TooLargeError(
+                    f"the texts of a form may have at most {MAX_FORM_TEXT_BYTES} bytes together; its file needs a file name"
+                )
+        super().on_part_data(data, start, end)
+
+    async def parse(self) -> FormData:
+        """What arrives until the form's end. Raises InvalidError where it is no form, or has a second file."""
+        try:
+            return await super().parse()
+        except MultiPartException as error:
+            raise InvalidError(f"the form cannot be read: {error.message}") from None
 
 
 @asynccontextmanager
@@ -118,11 +151,6 @@ async def opened(path: Path, mode: str) -> AsyncIterator[IO[bytes]]:
     """A file opened inside."""
     async with contextmanager_in_threadpool(await run_in_threadpool(path.open, mode)) as file:
         yield file
-
-
-async def _pieces_of(sent: UploadFile) -> AsyncIterator[bytes]:
-    while piece := await sent.read(PIECE_BYTES):
-        yield piece
 
 
 def preferred(request: Request, media_types: Sequence[str]) -> str:

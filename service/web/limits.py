@@ -14,6 +14,8 @@ MAX_BYTES_IN_MEMORY, MAX_BODIES_IN_MEMORY = 1 << 20, 64 << 20
 #: Bytes of any other body, and from which on it is checked in a thread. Chosen: four times a plan of 1,000 blocks; checking
 #: the worst takes some 20 ms, of 64 KiB 5.
 MAX_SHORT_BODY_BYTES, MAX_CHECKED_BYTES = 1 << 18, 1 << 16
+#: Bytes of all texts in a form beside its file. Chosen: a rig's profile of 100 columns has 20 kB.
+MAX_FORM_TEXT_BYTES = 1 << 17
 #: Times its own bytes that a packed body may hold, once it is longer than a piece. Chosen: a recorder's text is packed to a
 #: third up to a fortieth, zeros to a thousandth.
 MAX_RATIO = 200

@@ -151,11 +151,8 @@ def _system_error(request: Request, error: OSError) -> Response:
     if error.errno not in _NO_ROOM:
         return unexpected(request, error)
     _log.error("%s %s: %s", request.method, route_of(request), error)
-    detail = (
-        f"the service's disk has no room for the file ({error.strerror}). Nothing was stored: make room and send it again. "
-        "A form also needs room in the system's temporary folder; a file sent as the request's body does not"
-    )
-    return refused(NoRoomError, detail)
+    reason = f"the service's disk has no room for the file ({error.strerror})"
+    return refused(NoRoomError, f"{reason}. Nothing was stored: make room and send it again")
 
 
 def unexpected(request: Request, error: Exception) -> Response:

@@ -4,6 +4,7 @@ import asyncio
 import gzip
 import os
 import signal
+import tempfile
 import threading
 import zlib
 from collections.abc import Iterator
@@ -13,7 +14,7 @@ from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
-from unittest.mock import AsyncMock
+from unittest.mock import AsyncMock, Mock
 
 import httpx2
 import pytest
@@ -430,6 +431,33 @@ def test_files_are_kept_beside_the_database_while_they_are_read(
     assert client.post(ADDRESS, content=TEXT).status_code == 201
     assert [given.parent.parent for given in seen] == [beside]
     assert list(beside.iterdir()) == []
+
+
+def test_the_file_of_a_form_is_written_beside_the_database_at_once(
+    client: TestClient, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its first MiB was in memory and counted nowhere, the rest in the system's folder: 500 where there is none."""
+    monkeypatch.setattr(tempfile, "tempdir", "/nowhere")
+    spooled = Mock(side_effect=AssertionError("a form's file was held in memory"))
+    monkeypatch.setattr(tempfile.SpooledTemporaryFile, "write", spooled)
+    assert client.post(ADDRESS, files={"file": ("a.csv", TEXT + "\n" * (3 << 20))}).status_code == 201
+    assert not spooled.called
+
+
+@pytest.mark.parametrize(
+    ("form", "status", "words"),
+    [
+        ({"data": {"profile": "x" * (1 << 17)}, "files": {"file": ("a.csv", TEXT)}}, 422, "valid JSON"),
+        ({"data": {"profile": "x" * (1 << 17), "note": "y"}, "files": {"file": ("a.csv", TEXT)}}, 413, "131072 bytes"),
+        ({"files": {"file": (None, TEXT), "other": (None, b"")}}, 422, "a field with a file name"),
+        ({"files": {"file": ("a.csv", TEXT), "other": ("b.csv", TEXT)}}, 422, "cannot be read: Too many files"),
+    ],
+)
+def test_a_form_has_one_file_and_little_text(client: TestClient, form: dict[str, Any], status: int, words: str) -> None:
+    answer = client.post(ADDRESS, **form)
+    assert (answer.status_code, answer.headers["content-type"]) == (status, "application/problem+json")
+    assert words in answer.text
+    assert client.get("/v1/clutches/c1/runs").json()["items"] == []
 
 
 def test_what_a_killed_service_left_of_files_is_gone(tmp_path: Path) -> None:
