@@ -155,7 +155,7 @@ def state(
         events=past.events,
         adoptions=adoptions,
         priors={severity: _learned_prior(connection, own, severity, tracked) for severity in severities},
-        filters=_filters(connection, clutch_id) if carried else None,
+        filters=_filters(connection, row) if carried else None,
         held=past.held,
         summary={} if damaged else row.summary,
     )
@@ -364,11 +364,21 @@ def _store_tracking(connection: Connection, clutch_id: str, tracking: Tracking) 
     results.put_predictions(connection, clutch_id, predictions)
     results.clear_filter_states(connection, clutch_id)
     results.put_filter_states(connection, clutch_id, filters)
+    clutches.set_states_sum(connection, clutch_id, results.states_sum(connection, clutch_id))
 
 
-def _filters(connection: Connection, clutch_id: str) -> States | None:
+def states_finding(connection: Connection, row: ClutchRow) -> str | None:
+    """What is wrong where the filter states of a clutch are not those that were stored last, each whole as it may be."""
+    if results.states_sum(connection, row.clutch_id) == row.states_sum:
+        return None
+    return f"the filter states of clutch {row.clutch_id!r} are not those of its revision {row.revision}"
+
+
+def _filters(connection: Connection, row: ClutchRow) -> States | None:
     try:
-        rows = {method: row for (method, _), row in results.filter_states_of(connection, clutch_id).items()}
+        rows = {method: row for (method, _), row in results.filter_states_of(connection, row.clutch_id).items()}
+        if (finding := states_finding(connection, row)) is not None:
+            raise DamagedData(finding)
     except DamagedData as error:
         _log.warning("%s: the clutch is tracked again from its runs", error)
         return None

@@ -19,7 +19,8 @@ class ClutchRow:
 
     `registered` is the record as it was first posted where it was edited since, else None. `state` is the name of the
     clutch's state, `disputed` the life of which the newest finished diagnosis leaves data and model in dispute, `silent`
-    since when its rig has sent nothing, where that is an alarm.
+    since when its rig has sent nothing, where that is an alarm. `states_sum` is the checksum over those of its filter states
+    (`results.states_sum`).
     """
 
     clutch_id: str
@@ -34,6 +35,7 @@ class ClutchRow:
     state: str = "check"
     disputed: str | None = None
     silent: str | None = None
+    states_sum: int = 0
 
     @property
     def is_disputed(self) -> bool:
@@ -207,6 +209,11 @@ def set_silent(connection: Connection, clutch_id: str, silent: str | None, *, st
     """Note since when a clutch's rig has sent nothing, None: it has, and the state that follows. Raises LookupError on an
     unknown clutch."""
     _change(connection, clutch_id, {"silent": silent, "state": state})
+
+
+def set_states_sum(connection: Connection, clutch_id: str, states_sum: int) -> None:
+    """Note which filter states are the clutch's. Raises LookupError on an unknown one."""
+    _change(connection, clutch_id, {"states_sum": states_sum})
 
 
 def _change(connection: Connection, clutch_id: str, columns: Mapping[str, Any]) -> None:

@@ -5,6 +5,7 @@ after each run, a row a clutch, method, pressure (Pa; 0 = the mean) and cycles. 
 a row a clutch, method and pressure.
 """
 
+import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -191,6 +192,13 @@ def filter_states_of(connection: Connection, clutch_id: str) -> dict[tuple[str, 
             name = f"state of {row.method} at {row.pressure:g} Pa of clutch {clutch_id!r}"
             raise DamagedData(f"{name}: {error}") from error
     return states
+
+
+def states_sum(connection: Connection, clutch_id: str) -> int:
+    """A checksum over those of a clutch's states."""
+    query = select(filter_state.c.checksum).where(filter_state.c.clutch_id == clutch_id)
+    sums = connection.execute(query.order_by(filter_state.c.method, filter_state.c.pressure)).scalars()
+    return zlib.crc32(b",".join(b"%d" % checksum for checksum in sums))
 
 
 def clear_filter_states(connection: Connection, clutch_id: str) -> None:

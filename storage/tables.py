@@ -41,7 +41,8 @@ OPEN_ONLY = text("state IN ('waiting', 'running')")
 #: sorts those in a state, worst first ascending; `archived` is 1 for a clutch that lists leave out. `state` is the name of
 #: its state (NAMUR NE 107), which follows from the summary and `disputed`: the life of which the newest finished diagnosis
 #: found that data and model disagree, null where there is none or its model is adopted. `searched` is what a search looks
-#: into, folded. `silent`: since when its rig has sent nothing, where an alarm of that is raised.
+#: into, folded. `silent`: since when its rig has sent nothing, where an alarm of that is raised. `states_sum` is a checksum
+#: over those of its filter states: one of an earlier revision, put back with its own checksum, does not pass.
 clutch = Table(
     "clutch",
     metadata,
@@ -56,6 +57,7 @@ clutch = Table(
     Column("disputed", TEXT),
     Column("searched", TEXT, nullable=False, server_default=text("''")),
     Column("silent", TEXT),
+    Column("states_sum", WHOLE, nullable=False, server_default=text("0")),
     _checksum(),
     Index("clutch_worst_first", "archived", "rank", "clutch_id"),
     Index("clutch_by_state", "archived", "state", "rank", "clutch_id"),

@@ -83,9 +83,12 @@ def _finished(part: Callable[[Database, str], Checked], database: Database, clut
 
 
 def check_rows(database: Database, clutch_id: str) -> Checked:
-    """Every row of a clutch against its checksum."""
+    """Every row of a clutch against its checksum, and its filter states against those of its revision."""
     with database.reading() as connection:
         found = _unreadable(connection, {table: _of_clutch(table, clutch_id) for table in _tables(of_clutches=True)})
+        allow_damage(connection, everywhere=True)  # that is found already
+        if (finding := repository.states_finding(connection, repository.clutch(connection, clutch_id))) is not None:
+            found.append(finding)
     return Checked(findings=tuple(f"{clutch_id}: {finding}" for finding in found))
 
 

@@ -15,6 +15,7 @@ from service.runs.simulated import simulated_body
 from storage.checksums import of_values
 from storage.dialects import TEXT
 from storage.engine.opening import open_database
+from storage.results import states_sum
 from storage.tables import CHECKSUM, change, channel, clutch, filter_state, metadata, prediction, run
 
 AT = "2026-01-01T00:00:00+00:00"
@@ -85,6 +86,10 @@ def multiply(address: str, count: int) -> None:
             connection.execute(sa.insert(table).from_select([column.name for column in columns], rows))
             if CHECKSUM in table.c:
                 _seal(connection, table)
+        sums = [{"at": each, "sum": states_sum(connection, each)} for each in map(name, range(count))]
+        own = sa.update(clutch).where(clutch.c.clutch_id == sa.bindparam("at"))
+        connection.execute(own.values(states_sum=sa.bindparam("sum")), sums)
+        _seal(connection, clutch)
         if engine.dialect.name == "postgresql":  # keys were given here: the next is the sequence's
             greatest = sa.select(sa.func.max(run.c.run_key)).scalar_subquery()
             connection.execute(sa.select(sa.func.setval(sa.func.pg_get_serial_sequence("run", _OF_RUN), greatest)))

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from sqlalchemy import Connection, text, true
 
-from storage import clutches, raw_columns, runs
+from storage import clutches, raw_columns, results, runs
 from storage.checksums import allow_damage, amend
 from storage.clutches import ClutchRow
 from storage.diagnoses import DiagnosisRow
@@ -200,6 +200,8 @@ def reseal(connection: Connection) -> None:
     for table in metadata.sorted_tables:
         if CHECKSUM in table.c:
             amend(connection, table, [true()])
+    for clutch_id in clutches.all_ids(connection):
+        clutches.set_states_sum(connection, clutch_id, results.states_sum(connection, clutch_id))
 
 
 def take_back(connection: Connection) -> None:
@@ -207,8 +209,8 @@ def take_back(connection: Connection) -> None:
     connection.exec_driver_sql("ALTER TABLE clutch DROP COLUMN IF EXISTS later")
     connection.exec_driver_sql("ALTER TABLE job DROP COLUMN IF EXISTS renewals")
     connection.exec_driver_sql("ALTER TABLE job ADD COLUMN IF NOT EXISTS leased_until TEXT")
-    for column in ("acceptable", "measured"):
-        connection.exec_driver_sql(f"ALTER TABLE fit DROP COLUMN IF EXISTS {column}")
+    for table, column in (("fit", "acceptable"), ("fit", "measured"), ("clutch", "states_sum")):
+        connection.exec_driver_sql(f"ALTER TABLE {table} DROP COLUMN IF EXISTS {column}")
     for table in metadata.tables:
         connection.exec_driver_sql(f"ALTER TABLE {table} DROP COLUMN IF EXISTS checksum")
     connection.execute(text("UPDATE alembic_version SET version_num = :before"), {"before": OLD})

@@ -84,6 +84,30 @@ def test_a_damaged_result_is_computed_again_before_the_next_test_is_tracked(
     assert "0 findings" in clutchlife("verify", "--database", f"sqlite:///{path}")
 
 
+@pytest.mark.parametrize("table", ["filter_state", "clutch"])
+def test_a_row_of_an_earlier_revision_is_not_taken_for_the_present_one(
+    path: Path, table: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    """A filter state of as many tests, with its own valid checksum, was carried on: the last test was corrected since."""
+    with client_on(f"sqlite:///{path}") as client:
+        with closing(sqlite3.connect(path)) as connection:
+            before = connection.execute(f"SELECT * FROM {table} WHERE clutch_id = 'c1'").fetchall()
+        moved = {"cycles": 4400.0, "reason": "mistyped"}
+        assert client.patch("/v1/clutches/c1/runs/r4000", json=moved).status_code == 200
+    intact = Path(shutil.copy(path, path.with_name("intact.db")))
+    with client_on(f"sqlite:///{intact}") as client:
+        wanted = answers(client)
+    with closing(sqlite3.connect(path)) as connection, connection:
+        marks = ", ".join("?" * len(before[0]))
+        connection.executemany(f"REPLACE INTO {table} VALUES ({marks})", before)
+    said = clutchlife("verify", "--database", f"sqlite:///{path}", code=1)
+    assert "the filter states of clutch 'c1' are not those of its revision" in said
+    with client_on(f"sqlite:///{path}") as client:
+        assert answers(client) == wanted
+    assert any("tracked again from its runs" in record.getMessage() for record in caplog.records)
+    assert "0 findings" in clutchlife("verify", "--database", f"sqlite:///{path}")
+
+
 def test_a_damaged_clutch_is_listed_as_such_beside_the_others(path: Path) -> None:
     """It was listed with nine times its safe bound."""
     damage(path, RESULTS["a digit of a summary"])

@@ -4,7 +4,7 @@ import sqlalchemy as sa
 from alembic import op
 
 revision = "s9000_later"
-down_revision: str | None = "s0006_fits_keep_their_points"
+down_revision: str | None = "s0007_states_of_a_revision"
 
 
 def upgrade() -> None:
