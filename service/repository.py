@@ -377,10 +377,12 @@ def states_finding(connection: Connection, row: ClutchRow) -> str | None:
 def _filters(connection: Connection, row: ClutchRow) -> States | None:
     try:
         rows = {method: row for (method, _), row in results.filter_states_of(connection, row.clutch_id).items()}
-        if (finding := states_finding(connection, row)) is not None:
-            raise DamagedData(finding)
     except DamagedData as error:
-        _log.warning("%s: the clutch is tracked again from its runs", error)
+        finding: str | None = str(error)
+    else:
+        finding = states_finding(connection, row)
+    if finding is not None:
+        _log.warning("%s: the clutch is tracked again from its runs", finding)
         return None
     if any(row.code_version != CODE_VERSION for row in rows.values()):
         return None

@@ -134,6 +134,13 @@ def check_runs(database: Database, clutch_id: str) -> Checked:
 
 def _finding(database: Database, row: RunRow) -> str | None:
     try:
+        return _of_run(database, row)
+    except Exception as error:  # noqa: BLE001  (as in `_finished`: the next run is to be checked too)
+        return f"run {row.run_id} cannot be checked: {type(error).__name__}: {error}"
+
+
+def _of_run(database: Database, row: RunRow) -> str | None:
+    try:
         with database.reading() as connection:
             columns = raw_columns.stored_of_run(connection, row.run_key)
             stored_file = raw_columns.file_of(connection, row.run_key)

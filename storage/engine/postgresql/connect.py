@@ -20,7 +20,14 @@ from sqlalchemy.exc import TimeoutError as PoolTimeoutError
 from sqlalchemy.pool import ConnectionPoolEntry
 
 from storage.engine.database import translated_by
-from storage.engine.errors import DatabaseBusy, ServiceRuns, StorageError, StorageUnavailable, UnstorableText
+from storage.engine.errors import (
+    DamagedData,
+    DatabaseBusy,
+    ServiceRuns,
+    StorageError,
+    StorageUnavailable,
+    UnstorableText,
+)
 
 #: A lock that was not free in time, a serialization failure, a deadlock, and too many connections.
 LOCK_NOT_FREE = "55P03"
@@ -31,6 +38,8 @@ _BUSY = {
     "53300": "the server has no free connection",
 }
 _READ_ONLY = "25006"
+#: A text that is no value of the type as which it is read.
+_NO_VALUE = "22P02"
 #: Classes of codes: connections, passwords, unknown databases, means of the server, its operator, its disk, its faults.
 _UNAVAILABLE = ("08", "28", "3D", "53", "57", "58", "XX")
 
@@ -51,6 +60,8 @@ def _store_error(name: str, error: Exception) -> StorageError | None:
         return StorageUnavailable(f"{name}: the database is read-only ({reason})")
     if isinstance(error, DataError) and "NUL" in reason:
         return UnstorableText("text must not hold the character NUL (U+0000), which PostgreSQL cannot store")
+    if code == _NO_VALUE and "type json" in reason:
+        return DamagedData("the database holds JSON that is none")
     # a connection that was refused or has broken has no code
     if error.connection_invalidated or code is None or code.startswith(_UNAVAILABLE):
         return StorageUnavailable(f"{name}: the server cannot be used ({reason})")

@@ -62,7 +62,8 @@ _UNAVAILABLE = {
     sqlite3.SQLITE_CORRUPT: "the database file is damaged",
     sqlite3.SQLITE_NOTADB: "the file is not a database",
 }
-
+#: What SQLite says where it is to read a value in a text that is no JSON; the code is that of any mistake.
+_NO_JSON = "malformed JSON"
 
 #: Everything that driver and pool raise.
 DRIVER_ERRORS = (PoolTimeoutError, DBAPIError, sqlite3.Error)
@@ -75,6 +76,8 @@ def _store_error(path: Path, error: Exception) -> StorageError | None:
     code = getattr(origin, "sqlite_errorcode", None)
     if code is None and "decode" in str(origin):  # text that is none: the driver gives it no code
         return DamagedData(f"the database holds text that is none: {str(origin).partition(' with text')[0]}")
+    if str(origin) == _NO_JSON:
+        return DamagedData("the database holds JSON that is none")
     if code is None:
         return None
     primary = code & 0xFF

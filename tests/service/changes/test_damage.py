@@ -84,22 +84,32 @@ def test_a_damaged_result_is_computed_again_before_the_next_test_is_tracked(
     assert "0 findings" in clutchlife("verify", "--database", f"sqlite:///{path}")
 
 
-@pytest.mark.parametrize("table", ["filter_state", "clutch"])
+@pytest.mark.parametrize(
+    ("read", "put_back"),
+    [
+        ("SELECT * FROM filter_state WHERE clutch_id = 'c1'", "REPLACE INTO filter_state VALUES (?, ?, ?, ?, ?, ?, ?)"),
+        (
+            "SELECT rank, summary, state, states_sum, revision, checksum, clutch_id FROM clutch WHERE clutch_id = 'c1'",
+            "UPDATE clutch SET rank = ?, summary = ?, state = ?, states_sum = ?, revision = ?, checksum = ?"
+            " WHERE clutch_id = ?",
+        ),
+    ],
+    ids=["filter states", "a clutch"],
+)
 def test_a_row_of_an_earlier_revision_is_not_taken_for_the_present_one(
-    path: Path, table: str, caplog: pytest.LogCaptureFixture
+    path: Path, read: str, put_back: str, caplog: pytest.LogCaptureFixture
 ) -> None:
     """A filter state of as many tests, with its own valid checksum, was carried on: the last test was corrected since."""
     with client_on(f"sqlite:///{path}") as client:
         with closing(sqlite3.connect(path)) as connection:
-            before = connection.execute(f"SELECT * FROM {table} WHERE clutch_id = 'c1'").fetchall()
+            before = connection.execute(read).fetchall()
         moved = {"cycles": 4400.0, "reason": "mistyped"}
         assert client.patch("/v1/clutches/c1/runs/r4000", json=moved).status_code == 200
     intact = Path(shutil.copy(path, path.with_name("intact.db")))
     with client_on(f"sqlite:///{intact}") as client:
         wanted = answers(client)
     with closing(sqlite3.connect(path)) as connection, connection:
-        marks = ", ".join("?" * len(before[0]))
-        connection.executemany(f"REPLACE INTO {table} VALUES ({marks})", before)
+        connection.executemany(put_back, before)
     said = clutchlife("verify", "--database", f"sqlite:///{path}", code=1)
     assert "the filter states of clutch 'c1' are not those of its revision" in said
     with client_on(f"sqlite:///{path}") as client:
