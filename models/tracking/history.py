@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from operator import attrgetter
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,9 @@ from models.tracking.prior import TrackPrior
 _RESOLUTION = 1e-6
 #: Progress below this counts as none, so that ratios to it are finite. Chosen: a millionth of a duty cycle; no table.
 LEAST_SPAN = 1e-6
+#: What a measurement and a history hold of each test.
+COLUMNS = ("progress", "value", "variance", "epoch", "new_levels", "sensor")
+_row = attrgetter(*COLUMNS)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,13 +38,15 @@ class History:
     @classmethod
     def of(cls, measurements: Sequence[Measurement], prior: TrackPrior) -> "History":
         """The columns of a sequence of measurements, possibly empty, with the variance of their resolution added."""
-        rows = np.array([_row(m, prior) for m in measurements], dtype=np.float64).reshape(-1, 6)
-        return cls(**{field.name: rows[:, column].copy() for column, field in enumerate(fields(cls))})
+        rows = np.array(list(map(_row, measurements)), dtype=np.float64).reshape(-1, len(COLUMNS))
+        columns = dict(zip(COLUMNS, rows.T.copy(), strict=True))
+        columns["variance"] += resolution(prior) ** 2
+        return cls(**columns)
 
     def append(self, measurement: Measurement, prior: TrackPrior) -> "History":
         """A history with one more measurement."""
-        row = zip(fields(self), _row(measurement, prior), strict=True)
-        return History(**{field.name: np.append(getattr(self, field.name), number) for field, number in row})
+        more = History.of([measurement], prior)
+        return History(**{name: np.append(getattr(self, name), getattr(more, name)) for name in COLUMNS})
 
     @property
     def span(self) -> float:
@@ -93,14 +99,6 @@ def step_sizes(epoch: FloatArray, new_levels: FloatArray, step_size: float) -> F
     return np.where(np.diff(known) > 0, LEVEL_SIZE, step_size)
 
 
-def _row(measurement: Measurement, prior: TrackPrior) -> tuple[float, ...]:
-    resolution = _RESOLUTION * math.hypot(prior.initial_sd, prior.change_sd)
-    variance = measurement.variance + resolution**2
-    return (
-        measurement.progress,
-        measurement.value,
-        variance,
-        measurement.epoch,
-        measurement.new_levels,
-        measurement.sensor,
-    )
+def resolution(prior: TrackPrior) -> float:
+    """The deviation to which a series of values is resolved."""
+    return _RESOLUTION * math.hypot(prior.initial_sd, prior.change_sd)

@@ -332,51 +332,61 @@ def tabulated(
     form: NDArray[np.intp],
     outlying: FloatArray,
     blur: FloatArray | float = 0.0,
+    of: NDArray[np.intp] | None = None,
 ) -> Sums:
     """Weighted sums of the linear model over all nodes of a grid, by matrix products: [k, l, g] for k kinds (a form of the
     course with a set of outlying runs), l levels of scatter and g cells of the grid; sums without the basis b are [k, l, 1].
 
     `table` holds the basis b at the tests, [t, g] or [k, t, g]; a kind has its own levels log_scatter [k, l], a form [k] and
-    outlying runs [t, k]. `blur` is a further deviation of every measurement, one or [k].
+    outlying runs [t, k]. `blur` is a further deviation of every measurement, one or [k]. `of` [k] says where kinds share a
+    basis, and the variance of every measurement with it: the table is [c, t, g] then, and theirs is that at `of`.
 
-    Kinds whose courses may be disturbed have the precision R - R Z (I + Zᵀ R Z)⁻¹ Zᵀ R (Woodbury) with the disturbances'
-    columns Z times their deviations, instead of R = diag(r).
+    Kinds whose courses may be disturbed lose the products of N = L⁻¹ σZᵀR (1, y, b), as in `pointwise`.
     """
-    further, growth = (
-        (prior.outlying_size * prior.size) ** 2,
-        scatter_growth(form, prior.relative_squared(history.value)),
-    )
-    fixed = history.variance + further * outlying.T + (np.zeros(form.size) + blur)[:, None] ** 2
-    r = 1.0 / (fixed[:, None, :] + growth[:, None, :] * np.exp(2.0 * log_scatter)[:, :, None])
-    y, levels = history.value - prior.initial_mean, r.shape[1]
+    first = np.arange(form.size)
+    if of is not None:
+        used, first, of = np.unique(of, return_index=True, return_inverse=True)
+        table = table[used]
+    further = (prior.outlying_size * prior.size) ** 2
+    growth = scatter_growth(form[first], prior.relative_squared(history.value))
+    fixed = history.variance + further * outlying.T[first] + (np.zeros(form.size) + blur)[first, None] ** 2
+    r = 1.0 / (fixed[:, None, :] + growth[:, None, :] * np.exp(2.0 * log_scatter[first])[:, :, None])
+    y, z, levels = history.value - prior.initial_mean, columns(history), r.shape[1]
     if isinstance(history, MergedHistory):
         log_r = np.log(r) @ history.count - history.count.sum() * math.log(2.0 * math.pi)
         within = r @ history.within
         r *= history.count
     else:
         log_r, within = np.log(r).sum(axis=2) - y.size * math.log(2.0 * math.pi), np.zeros(1)
-    pull, squares = r * y, r @ np.square(table)
+    pull = r * y
     sums = {"r": r.sum(axis=2), "ry": pull.sum(axis=2), "ryy": pull @ y + within, "log_r": log_r}
-    z = columns(history)
-    terms, (where, sd) = z.shape[1], _disturbed(prior, FORM_SIZE[form], history)
+    sums["rbb"] = r @ np.square(table)
+    where, sd = _disturbed(prior, FORM_SIZE[form], history)
+    terms = z.shape[1] if where.size else 0
+    leaned = (r[:, :, None, :] * z.T[:terms]).reshape(first.size, levels * terms, y.size)
+    sums["rb"], sums["rby"], of_z = np.split(
+        np.concatenate([r, pull, leaned], axis=1) @ table, [levels, 2 * levels], axis=1
+    )
+    if of is not None:
+        sums = {name: column[of] for name, column in sums.items()}
     if where.size:
+        own = where if of is None else of[where]
+        gram, of_1, of_y = (
+            (leaned @ each).reshape(first.size, levels, terms, -1) for each in (z, np.ones((y.size, 1)), y[:, None])
+        )
         sd = sd.T[:, None, :]
-        weighted = (r[where, :, None, :] * z.T) * sd[..., None]
-        gram = (weighted.reshape(where.size * levels * terms, y.size) @ z).reshape(where.size, levels, terms, terms)
-        root = np.linalg.cholesky(np.eye(terms) + gram * sd[:, :, None, :])
-        left = np.linalg.inv(root) @ weighted
-        n_1, n_y = left.sum(axis=3), left @ y
-        n_b = left.reshape(where.size, levels * terms, y.size) @ (table if table.ndim == 2 else table[where])
-        squares[where] -= np.square(n_b, out=n_b).reshape(where.size, levels, terms, -1).sum(axis=2)
-        r[where] -= (n_1[:, :, None] @ left)[:, :, 0]
-        pull[where] -= (n_y[:, :, None] @ left)[:, :, 0]
+        root = np.linalg.cholesky(np.eye(terms) + sd[..., None] * gram[own] * sd[:, :, None, :])
+        inverse = np.linalg.inv(root) * sd[:, :, None, :]
+        n_1, n_y = inverse @ of_1[own], inverse @ of_y[own]
+        n_b = inverse @ of_z.reshape(first.size, levels, terms, -1)[own]
+        lost = np.swapaxes(np.concatenate([n_1, n_y], axis=3), 2, 3) @ n_b
+        sums["rb"][where] -= lost[:, :, 0]
+        sums["rby"][where] -= lost[:, :, 1]
+        sums["rbb"][where] -= np.square(n_b, out=n_b).sum(axis=2)
         log_diagonal = 2.0 * np.log(np.diagonal(root, axis1=2, axis2=3))
-        lost = {"r": n_1**2, "ry": n_1 * n_y, "ryy": n_y**2, "log_r": log_diagonal}
-        for name, loss in lost.items():
-            sums[name][where] -= loss.sum(axis=2)
-    rb = np.concatenate([r, pull], axis=1) @ table
-    by_level = {name: column[:, :, None] for name, column in sums.items()}
-    return Sums(rb=rb[:, :levels], rby=rb[:, levels:], rbb=squares, **by_level)
+        for name, loss in {"r": n_1**2, "ry": n_1 * n_y, "ryy": n_y**2, "log_r": log_diagonal}.items():
+            sums[name][where] -= loss.reshape(where.size, levels, terms).sum(axis=2)
+    return Sums(**{name: column[:, :, None] if column.ndim == 2 else column for name, column in sums.items()})
 
 
 def drawn_terms(terms: Terms, off_initial: FloatArray, change: FloatArray, normals: FloatArray) -> FloatArray:

@@ -22,9 +22,13 @@ class Measurement:
     sensor: int = 0
 
     def __post_init__(self) -> None:
-        counts = self.epoch, self.new_levels, self.sensor
-        if math.isfinite(self.progress + self.value + self.variance + sum(counts)) and (
-            min(self.progress, self.variance, *counts) >= 0
+        if (  # as it is nearly always: there are many of them
+            0.0 <= self.progress < math.inf
+            and 0.0 <= self.variance < math.inf
+            and -math.inf < self.value < math.inf
+            and 0 <= self.epoch < math.inf
+            and 0 <= self.new_levels < math.inf
+            and 0 <= self.sensor < math.inf
         ):
             return
         for name in ("progress", "value", "variance", "epoch", "new_levels", "sensor"):

@@ -19,6 +19,7 @@ median of their neighbours. One that probably is outlying is binned with others 
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -62,7 +63,7 @@ def merged(history: History, prior: TrackPrior) -> History:
     variance = variance + np.where(certain, (prior.outlying_size * prior.size) ** 2, 0.0)
     weight = 1.0 / (variance + scatter)
     number = np.where(apart, np.arange(value.size), bins_of(progress))
-    of = np.unique(np.stack([epoch, certain, apart, number], axis=1), axis=0, return_inverse=True)[1].ravel()
+    of = _distinct(epoch, certain, apart, number)
     for _ in range(MAX_SPLIT + 1):
         bins, first = _Bins(of=of, weight=weight), np.unique(of, return_index=True)[1]
         at, level = bins.mean(progress), bins.mean(value)
@@ -102,6 +103,17 @@ def judged(
     log_odds = _log_odds(off, variance + scatter, prior)
     apart = _apart(log_odds, epoch)
     return scatter, apart, (log_odds > 0.0) & ~apart
+
+
+def _distinct(*columns: NDArray[Any]) -> NDArray[np.intp]:
+    """Which of the distinct rows of several columns [t], in ascending order, each row is [t]."""
+    order = np.lexsort(columns[::-1])
+    begins = np.zeros(order.size, dtype=bool)
+    for column in columns:
+        begins[1:] |= np.diff(column[order]) != 0
+    of = np.empty(order.size, dtype=np.intp)
+    of[order] = np.cumsum(begins)
+    return of
 
 
 class _Bins:

@@ -168,11 +168,13 @@ def log_density(
     frame: LatticeFrame,
     table: FloatArray,
     blur: FloatArray | float = 0.0,
+    of: NDArray[np.intp] | None = None,
 ) -> FloatArray:
-    """Log posterior density up to a constant, [k, levels, rows, nodes]; a frame of one kind serves all."""
+    """Log posterior density up to a constant, [k, levels, rows, nodes]; a frame of one kind serves all. `of` [k]: which of
+    the tables is that of each kind, where those of one also share the variance of every measurement."""
     count, rows = kinds.form.size, frame.log_exponent.shape[1]
     levels = np.broadcast_to(frame.log_scatter, (count, frame.log_scatter.shape[1]))
-    sums = tabulated(history, prior, table, levels, kinds.form, kinds.outlying.T, blur)
+    sums = tabulated(history, prior, table, levels, kinds.form, kinds.outlying.T, blur, of)
     log_exponent = frame.log_exponent[:, None, :, None]
     place, by_kind = frame.log_rate(table.shape[-1] // rows)[:, None] + log_exponent, kinds.course[:, None, None, None]
     log_scale, stretch = log_scale_at(place, by_kind, history.span)
@@ -193,7 +195,9 @@ def closed_in(prior: TrackPrior, history: History) -> tuple[Kinds, LatticeFrame,
     # for each e-fold of τ between nodes: off by half a step b is off by 0.18 at most, and most of that goes into ξ0 and
     # Δ
     share = 0.03 * float(np.ptp(history.value))
-    table = tabled(first, _FIRST, history, np.array(CourseForm))
+    courses = np.unique(FORM_COURSE[np.isfinite(log_form_weight(prior))])
+    table = np.zeros((len(CourseForm), history.value.size, COARSE[1] * _FIRST))
+    table[courses] = tabled(first, _FIRST, history, courses)
     blur = share * float((first.upper - first.lower).max()) / (_FIRST - 1)
     kinds, density = _first(prior, history, first, table, blur)
     frame = shrunk(first.taken(np.zeros(kinds.form.size, dtype=np.intp)), density).resized(*COARSE[1:])
@@ -239,7 +243,7 @@ def _first(
     def looked_at(outlying: FloatArray) -> FloatArray:
         if outlying.tobytes() not in densities:
             kinds = Kinds.of(prior, outlying[None], LAID_FIRST)
-            densities[outlying.tobytes()] = log_density(prior, history, kinds, frame, table[kinds.course], blur)
+            densities[outlying.tobytes()] = log_density(prior, history, kinds, frame, table, blur, kinds.course)
         return densities[outlying.tobytes()]
 
     while (outlying := search.next()) is not None:

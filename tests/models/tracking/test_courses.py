@@ -426,3 +426,18 @@ def test_a_long_history_is_summed_by_blocks_as_at_once(monkeypatch: pytest.Monke
     at_once = linear_model.evidence(plain, BELIEF)
     np.testing.assert_allclose(linear_model.evidence(sums, BELIEF), at_once, rtol=1e-8, atol=1e-4)
     np.testing.assert_array_equal(terms.where, plain_terms.where)
+
+
+def test_kinds_that_share_a_table_have_the_sums_of_their_own() -> None:
+    history = History.of(EPOCHS, BELIEF)
+    forms = np.flatnonzero(~courses.FORM_PROPORTIONAL)[[0, 1, 3, -1, -2]]
+    own = courses.FORM_COURSE[forms]
+    tables = courses.basis(
+        history.progress[:, None], POINTS.log_scale, POINTS.log_exponent, np.array(courses.CourseForm)[:, None, None]
+    )
+    levels, outlying = np.tile([-8.0, -7.0], (forms.size, 1)), np.repeat(np.eye(13)[:, [5]], forms.size, axis=1)
+    sent = {"log_scatter": levels, "form": forms, "outlying": outlying, "blur": 0.01}
+    shared = linear_model.tabulated(history, BELIEF, tables, **sent, of=own)
+    apart = linear_model.tabulated(history, BELIEF, tables[own], **sent)
+    for name, found in asdict(shared).items():
+        np.testing.assert_allclose(found, getattr(apart, name), rtol=1e-9, err_msg=name)
