@@ -51,7 +51,7 @@ from service.clutch.recomputation import (
     with_set_aside,
 )
 from service.clutch.timeline import ByPressure, Event, lives_of, order
-from service.clutch.tracking import CARRIED, States, Tracked
+from service.clutch.tracking import CARRIED, PREDICTED, States, Tracked
 from service.clutch.with_held import ClutchMeasurements, engagement_rows, needs_evidence, summarised
 from service.errors import BusyError, InvalidError, NotFoundError, unknown_clutch
 from service.kept_history import FIT_COLUMNS, event_of, history
@@ -146,7 +146,7 @@ def state(
     extensions = [also, *(None if adopted is None else adopted.extension for adopted in adoptions)]
     exponents = {None, *(extension.severity_exponent for extension in extensions if extension is not None)}
     severities = {severity_under(own, exponent) for exponent in exponents}
-    last = results.prediction_at(connection, clutch_id, CARRIED[0], ALL_PRESSURES)
+    last = results.prediction_at(connection, clutch_id, CARRIED, ALL_PRESSURES)
     tracked = None if last is None or newest_prior or damaged or edited is not None else prediction(last)
     return ClutchHistory(
         record=own,
@@ -235,7 +235,7 @@ def receipts(connection: Connection, clutch_id: str) -> dict[str, Evaluation]:
 
 def answers(connection: Connection, clutch_id: str) -> list[Any]:
     """Receipts, predictions, summary and history as they are stored: whether they have changed decides on a new revision."""
-    tracks = [results.predictions_of(connection, clutch_id, method, ALL_PRESSURES) for method in CARRIED]
+    tracks = [results.predictions_of(connection, clutch_id, method, ALL_PRESSURES) for method in PREDICTED]
     past = history(connection, clutch(connection, clutch_id))
     return [receipts(connection, clutch_id), tracks, clutch(connection, clutch_id).summary, past.events, past.held]
 
@@ -386,7 +386,7 @@ def _filters(connection: Connection, row: ClutchRow) -> States | None:
         return None
     if any(row.code_version != CODE_VERSION for row in rows.values()):
         return None
-    return {method: Tracked.from_arrays(method, row.runs, row.arrays) for method, row in rows.items()}
+    return {method: Tracked.from_arrays(row.runs, row.arrays) for method, row in rows.items()}
 
 
 def _learned_prior(

@@ -32,7 +32,7 @@ from service.clutch.condition import with_held_runs
 from service.clutch.items import ENDED, INSUFFICIENT, SAFE, by_quantile, ended, warned
 from service.clutch.recomputation import ClutchHistory
 from service.clutch.timeline import Event, Series, date_of, moment_at, pace_of
-from service.clutch.tracking import advance, drawn, end_of_life, predict, predict_at, step_rng
+from service.clutch.tracking import advance, carrier, drawn, end_of_life, predict, predict_at, sampled, step_rng
 from service.clutch.with_held import with_held
 from service.errors import Notice
 from storage.engine.database import Database
@@ -98,9 +98,9 @@ def _prediction(state: ClutchHistory, method: str, planned: ProgrammeIn) -> tupl
         return predict_at(state.lives, assumptions, fraction, method=method), unknown
     life, runs = state.lives[-1], len(series.measurements)
     now = life.events[-1].cycles
-    tracked = advance(method, series, (state.filters or {}).get(method), runs)
+    tracked = advance(method, series, (state.filters or {}).get(carrier(method)), runs)
+    tracked = sampled(method, series, tracked)
     sample = drawn(method, series, tracked)
-    tracked = replace(tracked, sample=sample)
     recent = ended(predict(method, series, tracked, now, fraction, tests=life.tests), life.end)
     unknown = replace(unknown, recent_duty_cycles=recent.remaining_cycles)
     if recent.status in (INSUFFICIENT, ENDED):

@@ -26,7 +26,7 @@ from service.clutch.quantities.measured import (
     quantity_named,
 )
 from service.clutch.recomputation import ClutchHistory
-from service.clutch.tracking import CARRIED, predict_at
+from service.clutch.tracking import CARRIED, PREDICTED, predict_at
 from service.clutch.with_held import ClutchMeasurements, measured_life, with_held
 from service.errors import NotFoundError, unknown_clutch
 from service.tables import Cells, cells
@@ -51,8 +51,9 @@ def remaining_life(
 ) -> RemainingLife:
     """The remaining useful life as it is now, or as it would have been predicted at `at_cycles`.
 
-    The carried filters' predictions over all pressures are stored; those of the exact filter and at one pressure are
-    computed. Raises NotFoundError for an unknown clutch or a pressure that its first stationary test did not measure.
+    The predictions of the particles and of `ukf` over all pressures are stored; those of the exact filter and at one
+    pressure are computed. Raises NotFoundError for an unknown clutch or a pressure that its first stationary test did not
+    measure.
     """
     with database.reading() as connection:
         row = clutches.get(connection, clutch_id)
@@ -85,9 +86,9 @@ def remaining_life(
 
 
 def _by_method(connection: Connection, clutch_id: str, at_cycles: float | None) -> dict[str, LifePrediction]:
-    """The predictions of the remaining life by mean COF that are stored, of the filters that are carried along a life."""
+    """The predictions of the remaining life by mean COF that are stored."""
     stored = {
-        method: results.prediction_at(connection, clutch_id, method, ALL_PRESSURES, at_cycles) for method in CARRIED
+        method: results.prediction_at(connection, clutch_id, method, ALL_PRESSURES, at_cycles) for method in PREDICTED
     }
     return {method: repository.prediction(row) for method, row in stored.items() if row is not None}
 
@@ -95,7 +96,7 @@ def _by_method(connection: Connection, clutch_id: str, at_cycles: float | None) 
 def _predicted(
     state: ClutchHistory, method: str, pressure_bar: float | None, at_cycles: float | None
 ) -> LifePrediction:
-    carried = (state.filters or {}).get(CARRIED[0])
+    carried = (state.filters or {}).get(CARRIED)
     return predict_at(
         state.lives,
         state.assumptions,

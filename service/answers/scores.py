@@ -20,7 +20,7 @@ from service.channels import whole
 from service.clutch.assumptions import ALL_PRESSURES, Assumptions, severity_name
 from service.clutch.items import INSUFFICIENT
 from service.clutch.timeline import Life
-from service.clutch.tracking import CARRIED, predict_at
+from service.clutch.tracking import PREDICTED, predict_at
 from service.tables import Cells, cells
 from storage import results
 from storage.engine.database import Database
@@ -43,7 +43,7 @@ def scores_of_clutch(database: Database, clutch_id: str, method: MethodName) -> 
     for life in state.lives:
         end = end_of_life(life, assumptions, state.fraction)
         if end is not None:
-            predictions = stored if method in CARRIED else _predictions(life, assumptions, state.fraction, method)
+            predictions = stored if method in PREDICTED else _predictions(life, assumptions, state.fraction, method)
             items.append(_scored(life, assumptions, end, predictions))
     return Scores(clutch_id=clutch_id, method=method, revision=state.revision, items=items, next=None)
 

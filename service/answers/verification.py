@@ -19,7 +19,7 @@ from service import repository
 from service.channels import bar
 from service.clutch.assumptions import ALL_PRESSURES
 from service.clutch.recomputation import Results
-from service.clutch.tracking import CARRIED
+from service.clutch.tracking import PREDICTED
 from service.errors import InvalidError
 from service.repository import content_now, decoded, inspection_hash
 from service.settings import CODE_VERSION
@@ -217,7 +217,7 @@ def _stored(connection: Connection, clutch_id: str) -> _Results:
     for row in rows:
         stored_fits = fits.get(row.run_key, [])
         named |= {_fit(row.run_id, fit.pressure): (fit.code_version, _plain(asdict(fit))) for fit in stored_fits}
-    for method in CARRIED:
+    for method in PREDICTED:
         predictions = results.predictions_of(connection, clutch_id, method, ALL_PRESSURES)
         named |= {_prediction(method, item.cycles): (item.code_version, item.payload) for item in predictions}
     return named

@@ -314,7 +314,7 @@ def _brought_up(database: Database, names: Sequence[str], executor: Executor) ->
     def load(clutch_id: str) -> _Tracked | None:
         with database.reading() as connection:
             state = repository.state(connection, clutch_id, newest_prior=True)
-            last = results.prediction_at(connection, clutch_id, CARRIED[0], ALL_PRESSURES)
+            last = results.prediction_at(connection, clutch_id, CARRIED, ALL_PRESSURES)
             if last is None or repository.prediction(last).prior == state.assumptions.prior.name:
                 return None
             receipts = repository.receipts(connection, clutch_id)

@@ -317,7 +317,7 @@ def _carried(
     if (newest is not last and newest.shift) or state.filters is None:
         return None
     before = sum(1 for event in whole.events if event != index)
-    if state.filters.keys() != (set(CARRIED) if before else set()):
+    if state.filters.keys() != ({CARRIED} if before else set()):
         return None
     return None if any(tracked.runs != before for tracked in state.filters.values()) else state.filters
 

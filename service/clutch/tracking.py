@@ -1,6 +1,9 @@
-"""Tracks a life: runs the three filters over a series, and predicts after every event and whenever it is asked.
+"""Tracks a life: carries the particles over a series, and predicts after every event and whenever it is asked.
 
-A run that comes last in order of cycles carries the stored filter states one step on; any other run makes the life be
+The particle filter is the answer. `ukf` is one unscented step from the particles before the newest test, kept beside them;
+`grid` is the exact witness, computed when it is asked for.
+
+A run that comes last in order of cycles carries the stored particles one step on; any other run makes the life be
 tracked again from its first test. Both ways give the same answer: the random numbers of a step depend on series and step
 alone. Where a fleet's prior stands beside the weak one a filter runs under both, and its draws are put together by their
 evidence (`models.prognosis.fleet`).
@@ -8,7 +11,7 @@ evidence (`models.prognosis.fleet`).
 
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -22,7 +25,6 @@ from models.prognosis.first_passage import Offset, horizon_at, predict_first_pas
 from models.prognosis.stated_end import StatedEnd, stated_end
 from models.tracking.criteria import FEWEST_BEFORE
 from models.tracking.filters.grid import Grid, GridState
-from models.tracking.filters.particle import Particle, ParticleState
 from models.tracking.filters.ukf import Ukf, UkfState
 from models.tracking.innovation import next_innovation
 from models.tracking.measurement import Measurement
@@ -36,16 +38,17 @@ from service.clutch.criteria import FEWEST_PARTICLES, PREDICTION_DRAWS
 from service.clutch.timeline import Life, Series, lives_until, nearest_pressure
 from service.errors import NotFoundError
 
-FilterState = ParticleState | UkfState | GridState
+FilterState = UkfState | GridState
 
-_GRID = Grid()
-_TRACKERS: Mapping[str, Tracker[Any]] = {tracker.name: tracker for tracker in (Particle(), Ukf(), _GRID)}
-METHODS = tuple(_TRACKERS)
-#: The exact filter is laid again over the whole history at each step, and computed when it is asked for: these carry a
-#: state from run to run, and their predictions are stored with each.
-CARRIED = tuple(method for method in METHODS if method != _GRID.name)
+#: The filter that is carried from run to run, and those whose predictions are stored with each: the unscented one starts
+#: from it at every test.
+CARRIED = "particle"
+PREDICTED = CARRIED, Ukf.name
+#: Those that are computed over the whole history when they are asked for.
+_COMPUTED: Mapping[str, Tracker[Any]] = {tracker.name: tracker for tracker in (Grid(),)}
+METHODS = *PREDICTED, *_COMPUTED
 
-_STATES: Mapping[str, type[FilterState]] = {"particle": ParticleState, "ukf": UkfState}
+_UKF = Ukf()
 #: What the arrays of a back-cast are named after, among the names of priors.
 _BACK_CAST = "back_cast"
 #: What of a state are flags; numbers that happen to be 0 and 1 are stored like them.
@@ -64,13 +67,14 @@ class TrackPrediction:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tracked:
     """A filter's states after `runs` measurements of a series, by the name of the prior that they started from; what its
-    forecasts along the way said about the tests since; and the sample that was drawn of them, if one was: it is not stored.
+    forecasts along the way said about the tests since; and the samples that were drawn of them, by method: they are not
+    stored.
     """
 
     runs: int
     states: Mapping[str, FilterState]
     back_cast: BackCast
-    sample: TrackPosterior | None = None
+    samples: Mapping[str, TrackPosterior] = field(default_factory=dict)
 
     def to_arrays(self) -> dict[str, FloatArray | NDArray[np.bool_]]:
         """Named arrays: those of a state after the prior that it started from, as in `weak/mean`."""
@@ -83,14 +87,15 @@ class Tracked:
         return named | {f"{_BACK_CAST}/{name}": array for name, array in back_cast.items()}
 
     @classmethod
-    def from_arrays(cls, method: str, runs: int, arrays: Mapping[str, FloatArray | NDArray[np.bool_]]) -> "Tracked":
+    def from_arrays(cls, runs: int, arrays: Mapping[str, FloatArray | NDArray[np.bool_]]) -> "Tracked":
+        """The inverse of `to_arrays`, of the carried filter."""
         parts: dict[str, dict[str, Any]] = {}
         for name, array in arrays.items():
             owner, _, part = name.partition("/")
             is_number = array.dtype == np.float64 or part == _FLAGS
             parts.setdefault(owner, {})[part] = array if is_number else array.astype(np.float64)
         back_cast = BackCast(**parts.pop(_BACK_CAST))
-        states = {prior: _STATES[method].from_arrays(arrays_of_prior) for prior, arrays_of_prior in parts.items()}
+        states = {prior: UkfState.from_arrays(arrays_of_prior) for prior, arrays_of_prior in parts.items()}
         return cls(runs=runs, states=states, back_cast=back_cast)
 
 
@@ -100,7 +105,7 @@ States = Mapping[str, Tracked]
 def follow(
     life: Life, whole_series: Series, fraction: float, states: States, *, first_event: int = 0
 ) -> Iterator[tuple[States, list[TrackPrediction]]]:
-    """Walk a life's events from `first_event` on; after each, the states by method and the predictions of the series.
+    """Walk a life's events from `first_event` on; after each, the carried states and the predictions of the series.
 
     `whole_series` is that of all its events, `states` are those before `first_event`. A life with too few tests yields
     `insufficient_data`.
@@ -112,24 +117,29 @@ def follow(
             series = so_far.pooled(series.assumptions)
         runs, tests = series.until(index), so_far.tests
         if runs:
-            states = {method: _sampled(method, series, states.get(method), runs) for method in CARRIED}
+            states = {CARRIED: sampled(CARRIED, series, advance(CARRIED, series, states.get(CARRIED), runs))}
         predictions = []
-        for method in CARRIED:
-            made = predict(method, series, states.get(method), cycles, fraction, tests=tests)
+        for method in PREDICTED:
+            made = predict(method, series, states.get(CARRIED), cycles, fraction, tests=tests)
             predictions.append(TrackPrediction(cycles=cycles, method=method, prediction=items.ended(made, so_far.end)))
         yield states, predictions
 
 
-def _sampled(method: str, series: Series, tracked: Tracked | None, runs: int) -> Tracked:
-    """A filter carried on with the sample that is drawn of it, which the next test is compared with."""
-    tracked = advance(method, series, tracked, runs)
-    return replace(tracked, sample=drawn(method, series, tracked))
+def sampled(method: str, series: Series, tracked: Tracked) -> Tracked:
+    """A filter with the sample that is drawn of it: the next prediction, or the next test, asks for it again."""
+    return replace(tracked, samples={**tracked.samples, method: drawn(method, series, tracked)})
+
+
+def carrier(method: str) -> str:
+    """The method whose states a method's answers are drawn from."""
+    return CARRIED if method in PREDICTED else method
 
 
 def advance(
     method: str, series: Series, tracked: Tracked | None, runs: int, *, back_cast: BackCast | None = None
 ) -> Tracked:
-    """Carry one filter on until it has taken in the first `runs` measurements of the series.
+    """Carry the filter that a method's answers are drawn from on until it has taken in the first `runs` measurements of the
+    series.
 
     A `back_cast` that is known from another filter takes the place of its own. States that were made of other measurements
     or under other priors are not carried on: then the filter starts again.
@@ -139,26 +149,28 @@ def advance(
         tracked = None
     if tracked is not None and tracked.runs == runs:
         return tracked
-    tracker = _tracker(method, len(branches))
+    method = carrier(method)
+    tracker = _COMPUTED.get(method) or _carried(len(branches))
     weak_prior = series.priors(series.measurements[0])[WEAK]
     if tracked is None:
         start = {name: tracker.start(prior) for name, (prior, _) in branches.items()}
         tracked = Tracked(runs=0, states=start, back_cast=BackCast.nothing())
     for step in range(tracked.runs, runs):
-        measurement = series.measurements[step]
+        measurement, newest = series.measurements[step], step == runs - 1
+        update: Any = tracker.passed if isinstance(tracker, Ukf) and not newest else tracker.update
         states = {
-            name: tracker.update(state, branches[name][1][step], step_rng(_purpose(method, name), series, step))
+            name: update(state, branches[name][1][step], step_rng(_purpose(method, name), series, step))
             for name, state in tracked.states.items()
         }
         judged = back_cast
         if judged is None:
-            innovation = _innovation(method, series, tracked) if step == runs - 1 else []
+            innovation = _innovation(method, series, tracked) if newest else []
             judged = replace(tracked.back_cast.judged(measurement), innovation=np.array(innovation, dtype=np.float64))
         tracked = Tracked(runs=step + 1, states=states, back_cast=judged)
         if back_cast is None and kept_after(step + 1):
             sample = drawn(method, series, tracked)
             forecast = tracked.back_cast.forecast(sample, measurement, weak_prior)
-            tracked = replace(tracked, back_cast=forecast, sample=sample)
+            tracked = replace(tracked, back_cast=forecast, samples={method: sample})
     return tracked
 
 
@@ -176,12 +188,11 @@ def _branch(prior: str, draw: int, series: Series) -> str:
     return f"{prior}@{draw}" if series.draws else prior
 
 
-def _tracker(method: str, branches: int) -> Tracker[Any]:
-    """A filter in one of so many branches, among which the particles are shared."""
-    tracker = _TRACKERS[method]
-    if not isinstance(tracker, Particle):
-        return tracker
-    return replace(tracker, particles=max(tracker.particles // branches, min(tracker.particles, FEWEST_PARTICLES)))
+def _carried(branches: int) -> Ukf:
+    """The carried filter in one of so many branches, among which the particles are shared."""
+    particle = _UKF.particle
+    share = max(particle.particles // branches, min(particle.particles, FEWEST_PARTICLES))
+    return replace(_UKF, particle=replace(particle, particles=share))
 
 
 def _continues(tracked: Tracked, branches: Mapping[str, tuple[TrackPrior, tuple[Measurement, ...]]]) -> bool:
@@ -204,18 +215,24 @@ def drawn(method: str, series: Series, tracked: Tracked) -> TrackPosterior:
 
     Its size is shared among the priors and the draws of the model in force: so a prediction costs about the same.
     """
-    if tracked.sample is not None:
-        return tracked.sample
-    tracker, size = _tracker(method, len(tracked.states)), PREDICTION_DRAWS // len(tracked.states)
+    if method in tracked.samples:
+        return tracked.samples[method]
+    size = PREDICTION_DRAWS // len(tracked.states)
     parts = []
     for draw, (weight, measurements) in enumerate(series.weighted):
         posteriors = {}
         for prior in series.priors(measurements[0]):
             name = _branch(prior, draw, series)
             rng = step_rng(f"{_purpose(method, name)}-posterior", series, tracked.runs)
-            posteriors[prior] = tracker.posterior(tracked.states[name], size, rng)
+            posteriors[prior] = _posterior(method, tracked.states[name], size, rng)
         parts.append((weight, series.assumptions.pooled(posteriors, measurements[0], series.scale)))
     return mixture(parts) if series.draws else parts[0][1]
+
+
+def _posterior(method: str, state: FilterState, size: int, rng: np.random.Generator) -> TrackPosterior:
+    if method == CARRIED and isinstance(state, UkfState):
+        return _UKF.particle.posterior(state.particles, size, rng)
+    return _COMPUTED.get(method, _UKF).posterior(state, size, rng)
 
 
 def _purpose(method: str, prior: str) -> str:

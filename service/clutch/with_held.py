@@ -18,7 +18,7 @@ from service.clutch.quantities.ends import CriterionEnd, criteria_answer, criter
 from service.clutch.quantities.measured import ChosenLife, MeasuredLife, chosen_life
 from service.clutch.recomputation import ClutchHistory, Levels, Tracking, with_cofs
 from service.clutch.timeline import Life, moment_at, order, pace_of
-from service.clutch.tracking import CARRIED, States, predict_at
+from service.clutch.tracking import PREDICTED, States, carrier, predict_at
 from service.errors import NotFoundError
 
 
@@ -55,6 +55,7 @@ def summarised(state: ClutchHistory, tracking: Tracking, evidence: ClutchMeasure
         "from_cycles": life.origin,
         "tests": life.tests,
         "corrected": list(state.assumptions.model.corrected),
+        "oil_question": life.oil_question,
         "rig_question": life.rig_question(pooled.new_levels),
         "places": len({measurement.progress for measurement in pooled.measurements}),
         "pace": None if pace is None else {"cycles_per_second": pace, "moment": moment_at(life.events, pace, last)},
@@ -69,7 +70,7 @@ def held_summary(state: ClutchHistory, filters: States, evidence: ClutchMeasurem
     state_with_held = with_held(state, evidence)
     return {
         "held": len(state.held),
-        "with_held": {method: outlook(state_with_held, method, evidence, filters) for method in CARRIED},
+        "with_held": {method: outlook(state_with_held, method, evidence, filters) for method in PREDICTED},
     }
 
 
@@ -83,7 +84,9 @@ def with_held(state: ClutchHistory, evidence: ClutchMeasurements) -> ClutchHisto
 
 def outlook(state: ClutchHistory, method: str, evidence: ClutchMeasurements, filters: States) -> Mapping[str, Any]:
     """The remaining life by a filter and the clutch's own criteria; `filters` of other measurements are not carried on."""
-    prediction = predict_at(state.lives, state.assumptions, state.fraction, method=method, carried=filters.get(method))
+    prediction = predict_at(
+        state.lives, state.assumptions, state.fraction, method=method, carried=filters.get(carrier(method))
+    )
     prediction = by_own_criteria(state, method, prediction, evidence, filters)
     return {name: getattr(prediction, name) for name in ("status", "as_of_cycles", "remaining_cycles", "at_least")}
 

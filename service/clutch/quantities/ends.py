@@ -33,7 +33,7 @@ from service.clutch.quantities.measured import (
     slopes_along,
 )
 from service.clutch.timeline import Series, nearest_pressure
-from service.clutch.tracking import advance, drawn, end_of_life, offset_of, step_rng
+from service.clutch.tracking import advance, carrier, drawn, end_of_life, offset_of, step_rng
 from service.errors import NotFoundError
 
 #: Draws [n] with their weights [n].
@@ -117,7 +117,7 @@ def _mean_cof(
     measured: MeasuredLife, series: Series, fraction: float, method: str, at: FloatArray, horizon: float
 ) -> tuple[Sample, Sample]:
     """The end by a share of mean COF as `/remaining-useful-life` states it, and mean COF [2, n] at progress `at` [2]."""
-    tracked = advance(method, series, measured.filters.get(method), len(series.measurements))
+    tracked = advance(method, series, measured.filters.get(carrier(method)), len(series.measurements))
     sample = drawn(method, series, tracked)
     end = end_of_life(sample, series, tracked, measured.life.events[-1].cycles, fraction, horizon)
     values = np.maximum(track_paths(sample, at, offset_of(series)), 0.0)

@@ -17,7 +17,7 @@ from service.api.fleet import Scores
 from service.api.life import Method, PlannedLife, ProgrammeIn, RemainingLife
 from service.api.over_life import Degradation, EngagementOut, LoopPage, SeriesPage, StribeckPage, Surfaces
 from service.api.parameters import Draws, EngagementRun, LifeNumber, Quantity, TrackedQuantity
-from service.clutch.tracking import CARRIED
+from service.clutch.tracking import PREDICTED
 from service.jobs.workers import Lane
 from service.web import responses
 from service.web.context import AtCycles, Prefer, PressureBar, Until
@@ -44,7 +44,7 @@ async def remaining_useful_life(
     if own != NO_CRITERIA or (quantity, criterion, life) != (None, None, None):
         arguments = (method, pressure_bar, at_cycles, quantity, criterion, life)
         return await responses.computed_answer(of, life_by_criteria, *arguments, prefer=prefer)
-    if method not in CARRIED or pressure_bar is not None:
+    if method not in PREDICTED or pressure_bar is not None:
         return await responses.computed_answer(of, remaining_life, method, pressure_bar, at_cycles, prefer=prefer)
     return await responses.clutch_answer(of, remaining_life, method, None, at_cycles)
 

@@ -38,7 +38,7 @@ def stored(database: Database) -> list[Any]:
     """Receipts and predictions as they are stored."""
     with database.reading() as connection:
         receipts = [row.receipt for row in runs.page(connection, CLUTCH)]
-        return [receipts, [results.predictions_of(connection, CLUTCH, name, 0.0) for name in tracking.CARRIED]]
+        return [receipts, [results.predictions_of(connection, CLUTCH, name, 0.0) for name in tracking.PREDICTED]]
 
 
 @pytest.fixture

@@ -7,19 +7,24 @@ from typing import Any
 import numpy as np
 import pytest
 from filterpy.common import Q_continuous_white_noise
-from filterpy.kalman import MerweScaledSigmaPoints, UnscentedKalmanFilter
 from scipy.integrate import trapezoid
 
 from models.arrays import FloatArray
 from models.degradation.general_order import progress_fraction, value
 from models.prognosis.first_passage import PassageStatus, predict_first_passage, weighted_quantiles
 from models.tracking import linear_model
-from models.tracking.courses import FORM_COURSE, SCALE_SIGN, WITHOUT_EXPONENT, log_form_weight
+from models.tracking.courses import (
+    FORM_COURSE,
+    FORM_PROPORTIONAL,
+    FORM_SIZE,
+    SCALE_SIGN,
+    WITHOUT_EXPONENT,
+    log_form_weight,
+)
 from models.tracking.criteria import COURSE_SHARES, EQ_6_SHARE, KNEE_HAZARD, PROPORTIONAL_SHARE
-from models.tracking.filters import ukf
 from models.tracking.filters.grid import Grid
 from models.tracking.filters.particle import Particle
-from models.tracking.filters.ukf import DOMAIN, Ukf, scatter_learnt, unscaled
+from models.tracking.filters.ukf import DOMAIN, Normals, Ukf, _taken_in, scaled, unscaled
 from models.tracking.history import History
 from models.tracking.measurement import Measurement
 from models.tracking.prior import weak
@@ -70,7 +75,7 @@ def test_a_seed_gives_the_same_answer_twice_from_stored_arrays_too(tracker: Any)
     assert arrays.keys() == STORED_NAMES[tracker.name]
     # in the order of the fields of TrackPrior, of which 0.05 is the share of outlying runs and 0.1 their size
     assert arrays["prior"].tolist()[10:] == [0.05, 0.1, 0.95, 0.05, EQ_6_SHARE, PROPORTIONAL_SHARE, KNEE_HAZARD]
-    flags = ["outlying"] if tracker.name == "particle" else []
+    flags = [] if tracker.name == "grid" else ["outlying"]
     assert [name for name, column in arrays.items() if column.dtype == np.bool_] == flags
     assert all(column.dtype == np.float64 for name, column in arrays.items() if name not in flags)
     before, again = (
@@ -99,10 +104,11 @@ def test_particle_and_grid_agree_on_the_coefficients() -> None:
 
 
 SERIES = {"prior", "progress", "value", "variance", "epoch", "new_levels", "sensor"}
+PARTICLES = SERIES | {"points", "form", "outlying", "log_weight", "log_target"}
 STORED_NAMES = {
     "grid": SERIES,
-    "particle": SERIES | {"points", "form", "outlying", "log_weight", "log_target"},
-    "ukf": SERIES | {"place", "form", "log_weight", "mean", "covariance", "scatter"},
+    "particle": PARTICLES,
+    "ukf": PARTICLES | {f"normal_{name}" for name in ("reference", "form", "weight", "mean", "covariance")},
 }
 
 
@@ -210,48 +216,95 @@ def test_friction_that_has_fallen_at_once_is_followed_from_the_second_test_on(tr
     assert medians[1][1] == pytest.approx(0.078, abs=0.002)
 
 
-# --- The unscented filters: domain, scatter, and starting anew.
+# --- The unscented filter: one step of filterpy from the particles before a test.
+
+
+def test_the_ukf_leaves_the_particles_alone_and_carries_nothing() -> None:
+    """The particles beside it are those of the particle filter, bit for bit, and a step asks for no earlier normals."""
+    ukf, state = Ukf(), followed(Ukf(), PRIOR, CAMPAIGN[:8])
+    assert same(state.particles, followed(Particle(), PRIOR, CAMPAIGN[:8]))
+    assert state.normals.form.size > 0
+    steps = [
+        ukf.update(each, CAMPAIGN[8], np.random.default_rng(3))
+        for each in (state, ukf.passed(followed(ukf, PRIOR, CAMPAIGN[:7]), CAMPAIGN[7], np.random.default_rng(2)))
+    ]
+    for each in steps:
+        assert each.normals.form.size > 0
+    without = ukf.update(replace(state, normals=Normals.none()), CAMPAIGN[8], np.random.default_rng(3))
+    assert same(steps[0], without)
+    assert not same(*steps)
+
+
+@pytest.mark.parametrize("count", [0, 1, 4])
+def test_before_there_is_anything_to_step_from_the_answer_of_the_ukf_is_the_particles(count: int) -> None:
+    state = followed(Ukf(), PRIOR, CAMPAIGN[:count])
+    assert state.normals.form.size == 0
+    draws = [
+        tracker.posterior(of, 500, np.random.default_rng(0))
+        for tracker, of in ((Ukf(), state), (Particle(), state.particles))
+    ]
+    assert all(np.array_equal(getattr(draws[0], name), getattr(draws[1], name)) for name in COLUMNS)
+    assert followed(Ukf(), PRIOR, CAMPAIGN[:5]).normals.form.size > 0
 
 
 def test_the_ukf_stays_in_its_domain_and_definite() -> None:
+    stepped_on = 0
     for measurements in WEIRD.values():
-        state = followed(Ukf(), weak(measurements[0], falling=True), measurements)
-        if len(measurements) < Ukf().together:
-            assert state.form.size == 0
-            continue
-        assert np.abs(state.mean).max() <= 6.0
-        np.testing.assert_array_equal(state.covariance, np.swapaxes(state.covariance, 1, 2))
-        assert np.linalg.eigvalsh(state.covariance).min() > 0.0
+        normals = followed(Ukf(), weak(measurements[0], falling=True), measurements).normals
+        stepped_on += normals.form.size > 0
+        assert np.abs(normals.mean).max(initial=0.0) <= 6.0
+        np.testing.assert_array_equal(normals.covariance, np.swapaxes(normals.covariance, 1, 2))
+        assert np.linalg.eigvalsh(normals.covariance).min(initial=1.0) > 0.0
+        assert normals.weight.sum() == pytest.approx(float(normals.form.size > 0))
+    assert stepped_on >= 3
 
 
-def test_the_ukf_learns_the_scatter_from_its_innovations() -> None:
-    """Innovations of a scatter three times as large as believed, beside fits as uncertain as that belief: after 600
-    the scatter is known to 15 % (their number alone leaves 6 %)."""
-    believed, truth, rng = 3e-4, 9e-4, np.random.default_rng(0)
-    scatter, unit = np.array([believed**2, 2.0]), PRIOR.initial_sd
-    for _ in range(600):
-        variance = (scatter[0] + believed**2) / unit**2
-        off = rng.normal(0.0, math.hypot(truth, believed)) / unit
-        scatter = scatter_learnt(PRIOR, scatter, off**2 / variance, variance, 1.0)
-    assert math.sqrt(scatter[0]) == pytest.approx(truth, rel=0.15)
-    assert scatter[1] == 602.0
-    # no innovation teaches the ukf more than five deviations do
-    start = np.array([9e-8, 20.0])
-    learnt = [
-        float(scatter_learnt(PRIOR, start, surprise, 1.1 * 9e-8 / PRIOR.initial_sd**2, 1.0)[0])
-        for surprise in (9.0, 25.0, 1e4)
+@pytest.mark.parametrize("form", [0, 2, 2 + FORM_SIZE.size // 2])
+def test_a_step_from_narrow_normals_is_that_of_the_linear_filter(form: int) -> None:
+    """Eq. 6 alone, with a discrepancy beside it, and with scatter that is a share of the value: where a normal is so narrow
+    that the law is straight within it, the step is Kalman's, written out with the law's gradient."""
+    rng, reference, after = np.random.default_rng(1), 10_000.0, 12_000.0
+    centre = scaled(PRIOR, np.array([[0.13, 0.095, 8.4, -0.3, 1e-4, 2e-4, -7.9]]))[0]
+    root = 1e-4 * rng.standard_normal((7, 7))
+    covariance = root @ root.T
+    history = History.of(sent([0.0, reference, after], [0.13, 0.095, 0.0905], 1e-10), PRIOR)
+    (_, (mean, found)), (_, (outlying, _)) = _taken_in(centre, covariance, form, reference, history, PRIOR)
+
+    def law(x: FloatArray) -> float:
+        initial, at_reference, log_scale, log_exponent, delta, *_ = unscaled(PRIOR, x)
+        share = progress_fraction(np.array([after, reference]), math.exp(log_scale), math.exp(log_exponent))
+        return float((initial + (at_reference - initial) * share[0] / share[1] + delta) / PRIOR.initial_sd)
+
+    gap, move, unit = 0.2, np.eye(7), PRIOR.initial_sd
+    move[4, 5] = gap
+    noise = 1e-9 * np.eye(7)
+    at_the_last = FORM_SIZE[form] * PRIOR.size / unit * (reference / after) ** 1.5
+    noise[4:6, 4:6] += 3.0 * at_the_last**2 * Q_continuous_white_noise(2, dt=gap)
+    before, spread = move @ centre, move @ covariance @ move.T + noise
+    gradient = np.array([(law(before + h) - law(before - h)) / 2e-5 for h in 1e-5 * np.eye(7)])
+    scatter = math.exp(-2.0 * 7.9) * (PRIOR.relative_squared(0.0905) if FORM_PROPORTIONAL[form] else 1.0)
+    variance = gradient @ spread @ gradient + (history.variance[-1] + scatter) / unit**2
+    gain = spread @ gradient / variance
+    innovation = 0.0905 / unit - law(before)
+    assert np.abs(gain * innovation).max() > 1e-5
+    np.testing.assert_allclose(mean, before + gain * innovation, atol=0.02 * np.abs(gain * innovation).max())
+    np.testing.assert_allclose(found, spread - np.outer(gain, gain) * variance, atol=0.02 * spread.max())
+    assert np.abs(outlying - before).max() < 0.2 * np.abs(mean - before).max()
+
+
+@pytest.mark.parametrize("count", [6, 9, 13])
+def test_the_ukf_is_near_the_exact_filter_on_eq_6(count: int) -> None:
+    """Its quantiles of the end within a tenth of the exact ones' logarithm up to the median, and its weights of eq. 6."""
+    exact = on_grid(CAMPAIGN[:count], 2_000, np.random.default_rng(1), PRIOR)
+    found = Ukf().posterior(followed(Ukf(), PRIOR, CAMPAIGN[:count]), 2_000, np.random.default_rng(1))
+    ends = [
+        predict_first_passage(draws, fraction=0.5, as_of=CAMPAIGN[count - 1].progress).end_of_life
+        for draws in (found, exact)
     ]
-    assert learnt[1] == learnt[2] > learnt[0] > 9e-8
-    assert scatter_learnt(PRIOR, start, 1e4, 1.0, 0.0)[0] == start[0]
-
-
-def test_a_lost_ukf_starts_anew_from_the_whole_history() -> None:
-    """After runs that the filter cannot explain (a life that all at once falls twice as fast) it is where the grid is."""
-    progress = np.concatenate([np.linspace(0.0, 9e3, 10), np.linspace(9.3e3, 1.6e4, 20)])
-    values = [0.13 - 2e-6 * z - 6e-6 * max(0.0, z - 9e3) for z in progress]
-    bent = sent(progress, values, 1e-8)
-    assert followed(Ukf(), PRIOR, CAMPAIGN[:11]).reference == CAMPAIGN[7].progress
-    assert followed(Ukf(), PRIOR, bent).reference > 1e4
+    for quantile in (0.25, 0.5):
+        assert ends[0][quantile] == pytest.approx(ends[1][quantile], rel=0.1), quantile
+    eq_6 = [float(draws.weight @ (draws.course == 0)) for draws in (found, exact)]
+    assert eq_6[0] == pytest.approx(eq_6[1], abs=0.1)
 
 
 def test_the_ukf_books_the_step_of_each_event_on_that_event() -> None:
@@ -274,54 +327,12 @@ def test_the_ukf_bears_more_events_than_anyone_logs() -> None:
     progress = np.linspace(0.0, 20_000.0, 60)
     cof = value(progress, TYPICAL)
     runs = sent(progress, cof + 0.0004 * rng.standard_normal(60), 1e-8, np.arange(60))
-    prior = weak(runs[0], falling=True)
-    state = Ukf().update(replace(Ukf().start(prior), history=History.of(runs[:-1], prior)), runs[-1])
-    assert state.mean.shape[1] == 6 + 59
+    state = followed(Ukf(), weak(runs[0], falling=True), runs)
+    assert state.normals.mean.shape[1] == 7 + 59
     posterior = Ukf().posterior(state, 500, rng)
     now, deviation = posterior.moments(posterior.values(np.array([20_000.0]))[0])
     assert abs(now - cof[-1]) < 4.0 * deviation + 0.01
     assert posterior.weight.size == 500
-
-
-def test_a_step_of_all_filters_at_once_is_filterpys_step_of_each() -> None:
-    """Two filters of eq. 6, one with a discrepancy beside it, led on a fifth of their progress: means, covariances and
-    the measurement's moments are those of filterpy, filter by filter."""
-    state = followed(Ukf(), PRIOR, CAMPAIGN[:9])
-    of = np.flatnonzero(np.isin(state.form, state.form[:2]))
-    normals = replace(
-        state, form=np.array([0, 2]), **{n: getattr(state, n)[of] for n in ("mean", "covariance", "scatter")}
-    )
-    assert normals.mean.shape == (2, 6)
-    last, reference, unit = CAMPAIGN[8].progress, state.reference, PRIOR.initial_sd
-    after = 1.2 * last
-    history = normals.history.append(Measurement(progress=after, value=0.1, variance=0.0), PRIOR)
-
-    def moved(x: FloatArray, _: float) -> FloatArray:
-        return x + np.eye(6)[4] * x[5] * 0.2 * last / reference
-
-    def seen(x: FloatArray) -> FloatArray:
-        initial, at_reference, log_scale, log_exponent, beside, _ = unscaled(PRIOR, x)
-        share, whole = progress_fraction(np.array([after, reference]), np.exp(log_scale), np.exp(log_exponent))
-        return np.array([(initial + (at_reference - initial) * share / whole + beside) / unit])
-
-    mean, covariance = ukf.predicted(normals, history)
-    noise = covariance - ukf.predicted(replace(normals, form=np.zeros(2, dtype=np.intp)), history)[1]
-    assert noise[0].max() == 0.0 < noise[1].max()
-    white = Q_continuous_white_noise(2, dt=0.2 * last / reference)
-    np.testing.assert_allclose(noise[1, 4:, 4:] / noise[1, 5, 5], white / white[1, 1], rtol=1e-9)
-    expected, variance, across = ukf.measured(normals, mean, covariance, after)
-    for one in range(2):
-        points = MerweScaledSigmaPoints(n=6, alpha=1.0, beta=0.0, kappa=0.0)
-        theirs = UnscentedKalmanFilter(dim_x=6, dim_z=1, dt=1.0, hx=seen, fx=moved, points=points)
-        theirs.x, theirs.P = normals.mean[one], normals.covariance[one]
-        theirs.Q, theirs.R = noise[one] + 1e-9 * np.eye(6), np.array([[0.0]])
-        theirs.predict()
-        theirs.update(np.array([0.1 / unit]))
-        np.testing.assert_allclose(mean[one], theirs.x_prior, rtol=0, atol=1e-12)
-        np.testing.assert_allclose(covariance[one], theirs.P_prior, rtol=0, atol=1e-12)
-        assert expected[one] == pytest.approx(0.1 / unit - theirs.y[0], rel=1e-12)
-        assert variance[one] == pytest.approx(theirs.S[0, 0], rel=1e-9)
-        np.testing.assert_allclose(across[one], theirs.K[:, 0] * theirs.S[0, 0], rtol=0, atol=1e-12)
 
 
 def wandering() -> list[Measurement]:
@@ -333,10 +344,10 @@ def wandering() -> list[Measurement]:
 
 def test_no_course_that_the_ukf_draws_ended_before_the_last_test() -> None:
     """Where no course fits: one that grows without bounds at an end behind would be thousands of times the quantity."""
-    measurements, ended = wandering(), 0.0
-    state = followed(Ukf(), weak(measurements[0], falling=True), measurements[:20])
+    measurements, ended, rng = wandering(), 0.0, np.random.default_rng(0)
+    state = followed(Ukf(), weak(measurements[0], falling=True), measurements[:20], rng)
     for measurement in measurements[20:]:
-        state = Ukf().update(state, measurement)
+        state = Ukf().update(state, measurement, rng)
         draws = Ukf().posterior(state, 2_000, np.random.default_rng(7))
         behind = (draws.scale < 0.0) & (-draws.scale <= state.history.span)
         ended = max(ended, float(behind.mean()))
@@ -345,27 +356,16 @@ def test_no_course_that_the_ukf_draws_ended_before_the_last_test() -> None:
     assert ended > 0.0, "the case shows nothing: no course was drawn beyond its end"
 
 
-def test_where_every_drawn_course_has_ended_all_are_kept_alike() -> None:
-    """Normals of growing courses whose end is just beyond the reference, and a last measurement at twice that."""
+def test_where_courses_that_the_normals_hold_have_ended_the_answer_of_the_ukf_is_the_particles() -> None:
+    """Normals of growing courses that end just beyond the test before the last."""
     measurements = wandering()
     state = followed(Ukf(), weak(measurements[0], falling=True), measurements[:20])
-    growing = SCALE_SIGN[FORM_COURSE[state.form.astype(np.intp)]] < 0.0
-    assert growing.any()
-    normals = {name: getattr(state, name)[growing] for name in ("form", "log_weight", "mean", "covariance", "scatter")}
-    normals["mean"][:, 2] = -DOMAIN
-    normals["covariance"] *= 1e-12
-    history = state.history.append(replace(measurements[20], progress=2.0 * state.reference), state.prior)
-    state = replace(state, **normals, history=history)
-    drawn = Ukf().posterior(state, 500, np.random.default_rng(0))
-    assert (-drawn.scale <= state.history.span).all(), "the case shows nothing: a course has not ended"
-    np.testing.assert_array_equal(drawn.weight, 1.0 / 500)
-
-
-def test_before_the_first_measurement_the_ukf_draws_from_the_prior_and_has_no_normals() -> None:
-    state = Ukf().start(PRIOR)
-    assert state.mean.shape == (0, 6)
-    drawn = Ukf().posterior(state, 4_000, np.random.default_rng(0))
-    mean, deviation = drawn.moments(drawn.initial)
-    assert mean == pytest.approx(PRIOR.initial_mean, abs=0.05 * PRIOR.initial_sd)
-    assert deviation == pytest.approx(PRIOR.initial_sd, rel=0.05)
-    assert same(type(state).from_arrays(state.to_arrays()), state)
+    growing = SCALE_SIGN[FORM_COURSE[state.normals.form.astype(np.intp)]] < 0.0
+    share = state.normals.weight * growing
+    assert share.any()
+    ended = replace(state.normals, weight=share / share.sum(), mean=state.normals.mean.copy())
+    ended.mean[growing, 2] = -DOMAIN
+    ended.covariance[:] *= 1e-12
+    for normals, those_of_particles in ((state.normals, False), (ended, True)):
+        draws = Ukf().posterior(replace(state, normals=normals), 500, np.random.default_rng(0))
+        assert np.isin(draws.scatter, np.exp(state.particles.cloud.points[:, 2])).all() == those_of_particles
