@@ -20,7 +20,6 @@ Only runs that say when they were started are asked about. One that somebody con
 that go with it.
 """
 
-import bisect
 import itertools
 import math
 from collections.abc import Iterator, Sequence
@@ -29,6 +28,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from models.plausibility import criteria
+from models.plausibility.dates import longest_rise
 from models.plausibility.judgement import log_cycles_of, log_probability_of
 from models.plausibility.pace import log_anywhere
 from models.plausibility.slips import Run
@@ -248,7 +248,7 @@ def _other_clutch(dated: Sequence[_Dated]) -> Iterator[CommonCause]:
     """The fewest runs without which cycles do not fall from date to date."""
     if all(earlier.start <= later.start for earlier, later in itertools.pairwise(dated)):
         return
-    own = _longest_rise([run.start for run in dated])
+    own = longest_rise([run.start for run in dated])
     if 0 not in own:  # the clutch is the one whose runs came first
         own = set(range(len(dated))) - own
     other = [run for k, run in enumerate(dated) if k not in own]
@@ -260,20 +260,3 @@ def _other_clutch(dated: Sequence[_Dated]) -> Iterator[CommonCause]:
             cycles=tuple(run.end for run in other),
             reached=max(run.end for k, run in enumerate(dated) if k in own),
         )
-
-
-def _longest_rise(values: Sequence[float]) -> set[int]:
-    """The places of a longest subsequence that does not fall."""
-    lowest: list[float] = []  # the least value that ends a rise of each length, and where
-    ends: list[int] = []
-    before: list[int] = []
-    for k, value in enumerate(values):
-        length = bisect.bisect_right(lowest, value)
-        before.append(ends[length - 1] if length else -1)
-        lowest[length : length + 1], ends[length : length + 1] = [value], [k]
-    places: set[int] = set()
-    k = ends[-1] if ends else -1
-    while k >= 0:
-        places.add(k)
-        k = before[k]
-    return places

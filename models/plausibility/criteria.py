@@ -34,6 +34,8 @@ UNITS_OF_CYCLES = (1e3, 1e-3, 1.609_344, 0.621_371)
 #: pace is this at least, and its degrees of freedom; one so many deviations faster than usual is asked about. Chosen: tests
 #: last some minutes; with one degree of freedom, counters that jump were taken for rigs that run faster.
 LEAST_SECONDS, FEWEST_RATES, LEAST_RATE_SD, RATE_FREEDOM, FAST = 60.0, 2, 0.35, 8.0, 3.0
+#: So many times as fast as in every other step a rig does not suddenly run: a date is not believed (`dates`). Given.
+FASTER = 20.0
 #: Runs by date before and after a change that are looked at, and how many changes are asked about at once at most.
 LOOKED_BACK, MOST_ASKED = 20, 4
 

@@ -13,7 +13,16 @@ from service.api.run import Evaluation, Warned
 from service.channels import ZERO_CELSIUS, bar
 from service.clutch.criteria import EQ_6_DOUBTED, OTHER_OIL
 from service.clutch.items import ENDED, INSUFFICIENT, share_of_way, warned
-from service.clutch.timeline import ByPressure, Event, Life, Series, latest_before, nearest
+from service.clutch.timeline import (
+    ByPressure,
+    Event,
+    Life,
+    Series,
+    date_of,
+    latest_before,
+    nearest,
+    with_believed_dates,
+)
 from service.errors import Notice
 
 #: The filter whose normals suit eq. 6 alone.
@@ -21,9 +30,11 @@ UNSCENTED = "ukf"
 #: The warning of a last test that lies far off what the tests before it predict.
 OFF_TRACK = "off_track"
 #: Warnings of a run in its clutch's history, written again where the history changes: it arrived after a run of more cycles,
-#: its pressures or its oil temperature are not those of the first test, its mean COF is not what those before it predict.
+#: its pressures or its oil temperature are not those of the first test, its mean COF is not what those before it predict,
+#: its date is not where its cycles are.
 LATE, OTHER_PRESSURES, OTHER_OIL_TEMPERATURE = "late_arrival", "other_pressures", "other_oil_temperature"
-OF_HISTORY = LATE, OTHER_PRESSURES, OTHER_OIL_TEMPERATURE, OFF_TRACK
+ODD_DATE = "date_out_of_order"
+OF_HISTORY = LATE, OTHER_PRESSURES, OTHER_OIL_TEMPERATURE, OFF_TRACK, ODD_DATE
 
 
 def not_eq_6(courses: Sequence[CourseProbability]) -> list[Notice]:
@@ -140,6 +151,17 @@ def late_arrival(cycles: float, latest: float) -> list[Notice]:
     return [Notice(code=LATE, message=message)]
 
 
+def odd_dates(life: Life) -> dict[str, list[Notice]]:
+    """By run_id, the warning of a date that does not fit those of the other runs of a life in the order of their cycles."""
+    believed = {event.run_id for event in with_believed_dates(life.events)}
+    odd = [event for event in life.events if event.dated and event.run_id not in believed]
+    message = (
+        "the date (started_at) {} does not fit the dates of the other runs in the order of their cycles. It takes no part "
+        "in the pace: check the rig's clock and the cycles"
+    )
+    return {event.run_id: [Notice(code=ODD_DATE, message=message.format(date_of(event.moment)))] for event in odd}
+
+
 def other_pressures_notice(reference: ByPressure, cofs: ByPressure) -> list[Notice]:
     """A test that cannot be compared with the reference test: none of its pressures is one of that's."""
     if not cofs or any(nearest(level, cofs) is not None for level in reference):
@@ -180,11 +202,13 @@ def history_warnings(
 ) -> dict[str, list[Warned]]:
     """run_id -> the warnings of every run in its history, or of one; `off_track` are those of predictions after tests."""
     latest = latest_before([event for life in lives for event in life.events])
+    dates = {name: notices for life in lives for name, notices in odd_dates(life).items()}
     return {
         event.run_id: [
             *warned(late_arrival(event.cycles, latest[event.run_id])),
             *warned(other_pressures_notice(life.reference, event.cofs)),
             *warned(other_oil_notice(life, event)),
+            *warned(dates.get(event.run_id, [])),
             *off_track.get(event.run_id, ()),
         ]
         for life in lives

@@ -20,11 +20,12 @@ from models.arrays import FloatArray
 from models.clutch import Geometry
 from models.degradation.severity import Block
 from models.friction.speed_protocol import protocol_speeds
+from models.plausibility.dates import believed_dates
 from models.records.criteria import LEVEL_GAP, LEVEL_GAP_SHARE
 from models.tracking.measurement import Measurement
 from models.tracking.prior import TrackPrior
 from service.api.run import EndReason
-from service.channels import RADIANS_PER_SECOND_PER_RPM, bar
+from service.channels import RADIANS_PER_SECOND_PER_RPM, ZERO_CELSIUS, bar
 from service.clutch.analysis import Value
 from service.clutch.assumptions import ALL_PRESSURES, MEAN_COF, Assumptions, Scale
 from service.clutch.criteria import CLOCKS_APART, EARLIEST, LEVELS_APART, OTHER_OIL
@@ -68,12 +69,13 @@ class Shown:
 class Event:
     """A run as the history sees it.
 
-    `moment` is when it was made [s], `dated` whether the rig said so, `arrived` its place in the order of arrival, infinite
-    while it comes in. A stationary test has the range of its speeds [rad/s], its mean oil temperature [K], and mean COF with
-    its deviation by pressure [Pa] where its curves determine it, and `under` each draw of the model in force where that
-    corrects it; `duty` is the block that ends with the run, `shift` an event that may have shifted the level, of the
-    readings alone where it `zeroes_sensor`, `end` why the life was declared ended with it; `shown` what its rows show (None:
-    a channel is dead, so that no other run bears on whether it is held), `confirmed` whether somebody confirmed it.
+    `moment` is when it was made [s], `dated` whether the rig said so, `arrived` its place in the order of arrival,
+    infinite while it comes in. A stationary test has the range of its speeds [rad/s], the mean and the range of its
+    oil's temperature [K], and mean COF with its deviation by pressure [Pa] where its curves determine it, and `under`
+    each draw of the model in force where that corrects it; `duty` is the block that ends with the run, `shift` an
+    event that may have shifted the level, of the readings alone where it `zeroes_sensor`, `end` why the life was
+    declared ended with it; `shown` what its rows show (None: a channel is dead, so that no other run bears on whether
+    it is held), `confirmed` whether somebody confirmed it.
     """
 
     run_id: str
@@ -83,6 +85,7 @@ class Event:
     arrived: float = math.inf
     speed_range: Value | None = None
     oil_temperature: float | None = None
+    oil_range: Value | None = None
     cofs: ByPressure = field(default_factory=dict)
     rebuild: bool = False
     shift: bool = False
@@ -225,6 +228,17 @@ class Life:
         if reference is None or event.oil_temperature is None:
             return False
         return abs(event.oil_temperature - reference) > OTHER_OIL
+
+    @property
+    def oil_question(self) -> str | None:
+        """What the last test says of its oil, as a clause, where its temperature moved so far within it that its curves mix
+        temperatures."""
+        last = next((event for event in reversed(self.events) if event.speed_range is not None), None)
+        low, high = (last and last.oil_range) or (0.0, 0.0)
+        if last is None or high - low <= OTHER_OIL:
+            return None
+        went = f"the oil went from {low - ZERO_CELSIUS:.0f} to {high - ZERO_CELSIUS:.0f} °C"
+        return f"{went} within the test at {last.cycles:,.0f} cycles"
 
     def rig_question(self, new_levels: Sequence[float]) -> str | None:
         """What a change of the rig would explain as well as one of the clutch, as a clause: a step that no event explains,
@@ -507,9 +521,17 @@ def is_possible(started_at: str, received_at: str) -> bool:
     return started.timestamp() >= EARLIEST and started.timestamp() <= received.timestamp() + CLOCKS_APART
 
 
-def pace_of(events: Sequence[Event]) -> float | None:
-    """Cycles a second between the first and the last dated run of a life, idle hours included; None where none is known."""
+def with_believed_dates(events: Sequence[Event]) -> list[Event]:
+    """The dated runs of a life, ordered, whose dates fit each other in the order of their cycles."""
     dated = [event for event in events if event.dated]
+    starts = [event.cycles if event.duty is None else max(event.cycles - event.duty.cycles, 0.0) for event in dated]
+    return [dated[index] for index in sorted(believed_dates(starts, [event.moment for event in dated]))]
+
+
+def pace_of(events: Sequence[Event]) -> float | None:
+    """Cycles a second between the first and the last run of a life whose dates are believed, idle hours included; None where
+    none is known."""
+    dated = with_believed_dates(events)
     if len(dated) < 2:
         return None
     seconds, cycles = dated[-1].moment - dated[0].moment, dated[-1].cycles - dated[0].cycles
@@ -517,9 +539,9 @@ def pace_of(events: Sequence[Event]) -> float | None:
 
 
 def moment_at(events: Sequence[Event], pace: float, cycles: float) -> float:
-    """When [s since 1970] so many cycles since new will have been run at a pace [1/s], from the newest dated run of a life
-    on, or from its newest where none is dated. There is at least one run."""
-    start = next((event for event in reversed(events) if event.dated), events[-1])
+    """When [s since 1970] so many cycles since new will have been run at a pace [1/s], from the newest run of a life
+    on whose date is believed, or from its newest where none is. There is at least one run."""
+    start = (with_believed_dates(events) or events)[-1]
     return start.moment + (cycles - start.cycles) / pace
 
 
