@@ -204,6 +204,7 @@ def event_of(row: RunInOrder, cofs: ByPressure) -> Event:
         arrived=row.run_key,
         speed_range=None if low is None or high is None else (low, high),
         oil_temperature=row.oil_temperature,
+        oil_range=None if row.coldest_oil is None or row.warmest_oil is None else (row.coldest_oil, row.warmest_oil),
         cofs=cofs,
         **maintenance_fields(row.event, row.reason),
         duty=duty_block(row.cycles, row.duty_cycles, row.duty_energy_kj, row.duty_speed_rpm, row.duty_duration_s),

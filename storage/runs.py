@@ -56,10 +56,10 @@ class ReceiptRow:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunInOrder:
-    """As much of a run as tracking and doubts need; a stationary test has the range of its speeds and the mean temperature
-    of its oil [K], maintenance its event, a block of duty its load (in the units in which it was sent). `doubted`: there are
-    or were doubts; `shown` is what it shows of friction, as JSON text; `follows` the clutch's revision to which the run was
-    appended, None where it changed more."""
+    """As much of a run as tracking and doubts need; a stationary test has the range of its speeds and the mean and
+    the range of its oil's temperature [K], maintenance its event, a block of duty its load (in the units in which it
+    was sent). `doubted`: there are or were doubts; `shown` is what it shows of friction, as JSON text; `follows` the
+    clutch's revision to which the run was appended, None where it changed more."""
 
     run_key: int
     run_id: str
@@ -74,6 +74,8 @@ class RunInOrder:
     shown: str | None = None
     reason: str | None = None
     oil_temperature: float | None = None
+    coldest_oil: float | None = None
+    warmest_oil: float | None = None
     duty_cycles: float | None = None
     duty_energy_kj: float | None = None
     duty_speed_rpm: float | None = None
@@ -94,6 +96,8 @@ _light = select(
     json_text(run.c.details, "shown"),
     json_value(run.c.details, "reason"),
     json_value(run.c.details, "oil_temperature"),
+    json_value(run.c.details, "oil_range", 0),
+    json_value(run.c.details, "oil_range", 1),
     json_value(run.c.details, "duty", "cycles"),
     json_value(run.c.details, "duty", "energy_per_cycle_kj"),
     json_value(run.c.details, "duty", "initial_speed_rpm"),

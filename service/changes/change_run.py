@@ -200,8 +200,8 @@ def _with(loaded: _Loaded, run: IncomingRun) -> _Loaded:
     run_id, received_at = run.run_id, loaded.row.received_at
     answer = receipt(loaded.row.clutch_id, run, analysis, received_at=received_at)
     shown, odd = doubts_alone(run, analysis, loaded.state.geometry)
-    sampled, oil = "time_s" in run.channels, analysis.oil_temperature
-    event = replace(loaded.event, speed_range=analysis.speed_range, oil_temperature=oil, shown=shown)
+    sampled, of_test = "time_s" in run.channels, ("speed_range", "oil_temperature", "oil_range")
+    event = replace(loaded.event, shown=shown, **{name: getattr(analysis, name) for name in of_test})
     return replace(
         loaded,
         events=(event,),

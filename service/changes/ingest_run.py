@@ -371,6 +371,7 @@ def _event_of(arrival: Arrival) -> timeline.Event:
         moment=moment,
         speed_range=arrival.analysis.speed_range,
         oil_temperature=arrival.analysis.oil_temperature,
+        oil_range=arrival.analysis.oil_range,
         **timeline.maintenance_fields(run.details.get("event"), run.details.get("reason")),
         duty=timeline.duty_block(run.cycles, *(duty.get(name) for name in names)),
         dated=dated,

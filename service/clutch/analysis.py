@@ -59,14 +59,16 @@ class LevelFit:
 class Analysis:
     """The results of one run by itself.
 
-    Of a stationary test: `speed_range` [rad/s] under pressure, `oil_temperature` [K], its mean under pressure (None: not
-    measured), `plateaus`, and the `times` [s] of their middles (None where each row was sent as a plateau). Of a block of
-    duty that carries one: `engagement`.
+    Of a stationary test: `speed_range` [rad/s] under pressure, `oil_temperature` [K], its mean under pressure, and
+    `oil_range` [K], which nine tenths of its plateaus lie within (None: not measured), `plateaus`, and the `times`
+    [s] of their middles (None where each row was sent as a plateau). Of a block of duty that carries one:
+    `engagement`.
     """
 
     fits: tuple[LevelFit, ...] = ()
     speed_range: tuple[float, float] | None = None
     oil_temperature: float | None = None
+    oil_range: Value | None = None
     warnings: tuple[Notice, ...] = ()
     plateaus: Plateaus | None = None
     times: tuple[float, ...] | None = None
@@ -84,6 +86,8 @@ class Analysis:
             details["speed_range"] = list(self.speed_range)
         if self.oil_temperature is not None:
             details["oil_temperature"] = self.oil_temperature
+        if self.oil_range is not None:
+            details["oil_range"] = list(self.oil_range)
         return details
 
 
@@ -145,8 +149,9 @@ def _analyse_stationary(
     low, high = float(speed.min()), float(speed.max())
     velocities = geometry.sliding_velocity(protocol_speeds(low, high)) if low < high else None
     cofs = {} if velocities is None else mean_cofs(levels, velocities, geometry)
+    oil_range = _oil_range(under_load)
     warnings = [
-        *_oil_moves(under_load),
+        *_oil_moves(oil_range),
         *noticed,
         *(notice for level in levels for notice in _level_warnings(level, under_load)),
         *(notice for level in levels for notice in _fit_warnings(level)),
@@ -156,6 +161,7 @@ def _analyse_stationary(
         fits=levels,
         speed_range=(low, high) if cofs else None,
         oil_temperature=None if under_load.oil_temperature is None else float(under_load.oil_temperature.mean()),
+        oil_range=oil_range,
         warnings=tuple(warnings),
         plateaus=plateaus,
         times=times,
@@ -220,11 +226,17 @@ def _level_warnings(level: LevelFit, plateaus: Plateaus) -> list[Notice]:
     return [Notice(code="wide_level", message=message)]
 
 
-def _oil_moves(plateaus: Plateaus) -> list[Notice]:
-    """Oil whose temperature changes within a test by more than two tests of a life may be apart."""
+def _oil_range(plateaus: Plateaus) -> Value | None:
+    """Between which temperatures [K] the oil is in nine tenths of a test's plateaus; None where it was not measured."""
     if plateaus.oil_temperature is None:
-        return []
+        return None
     low, high = np.quantile(plateaus.oil_temperature, [0.05, 0.95]).tolist()
+    return low, high
+
+
+def _oil_moves(oil_range: Value | None) -> list[Notice]:
+    """Oil whose temperature changes within a test by more than two tests of a life may be apart."""
+    low, high = oil_range or (0.0, 0.0)
     if high - low <= OTHER_OIL:
         return []
     message = (

@@ -16,7 +16,7 @@ from service.api.clutch import ClutchSummary, LastRun, LatestDiagnosis, Recent
 from service.api.life import HeldRuns, LifePrediction
 from service.api.run import Warned
 from service.channels import whole
-from service.clutch.criteria import FEW_CYCLES, LONGEST_TEST, MAX_LINE_POINTS, NEAR_LIMIT, SOON
+from service.clutch.criteria import FEW_CYCLES, LONGEST_TEST, MAX_LINE_POINTS, NEAR_LIMIT, OTHER_OIL, SOON
 from service.clutch.items import ENDED, INSUFFICIENT
 from service.clutch.notices import interval_in_words
 from service.clutch.timeline import WORN, Event, Series, date_of
@@ -261,6 +261,8 @@ def _action(name: str, summary: Mapping[str, Any], soon: str, diagnosis: LatestD
     held = summary.get("held", 0)
     if summary.get("ended") and not held:
         return "Its life has ended: record the rebuild, or archive it."
+    if (oil := summary.get("oil_question")) and not summary.get("ended"):
+        return f"Bring the oil to one temperature, within {OTHER_OIL:g} °C, and repeat the test: {oil}."
     if name in (FAILURE, MAINTENANCE) and not summary.get("ended") and (question := summary.get("rig_question")):
         how = "run the diagnosis" if diagnosis is None else "see the diagnosis"
         return f"Check the measurement before you replace anything: {question}, which a rig may do too; {how}."

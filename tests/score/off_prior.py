@@ -9,7 +9,14 @@ import numpy as np
 
 from models.prognosis.first_passage import ends_of_life, predict_first_passage
 from models.rig.truth import draw
-from models.tracking.courses import FORM_COURSE, FORM_PROPORTIONAL, FORM_SIZE, coefficients_at, log_form_weight
+from models.tracking.courses import (
+    FORM_COURSE,
+    FORM_PROPORTIONAL,
+    FORM_SIZE,
+    UNIT_OF_CHANGE,
+    coefficients_at,
+    log_form_weight,
+)
 from models.tracking.criteria import KNEE_HAZARD, KNEE_PACE, KNEE_REACH, LOG_KNEE_PACE_SD, UNSEEN_WEAR
 from models.tracking.discrepancy import FUTURE, PAST, CourseDiscrepancy
 from models.tracking.filters.grid import Grid
@@ -102,7 +109,7 @@ def stated(count: int, seed: int, *, whole: bool) -> tuple[np.ndarray, np.ndarra
             scale, exponent = coefficients_at(np.log(truth.scale), np.log(truth.exponent), course)
             if scale[0] < 0.0 and -scale[0] <= last:  # ended before it was measured
                 continue
-            truth = replace(truth, scale=scale, exponent=exponent)
+            truth = replace(truth, change=truth.change / UNIT_OF_CHANGE[course], scale=scale, exponent=exponent)
             course = size * PRIOR.size * rng.standard_normal((1, PAST + FUTURE))
             unworn = truth.initial[0] - truth.values(np.array([last]))[0, 0] < UNSEEN_WEAR * truth.initial[0]
             times = (1.0 - rng.random()) ** (-1.0 / KNEE_HAZARD)

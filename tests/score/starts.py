@@ -1,7 +1,7 @@
 """The safe bound after the first tests of a life that show no wear: level ones, and ones that run in."""
 
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from models.prognosis.first_passage import weighted_quantiles
 from models.prognosis.stated_end import stated_end
 from models.tracking.filters.grid import Grid
 from models.tracking.measurement import Measurement
-from models.tracking.prior import weak
+from models.tracking.prior import TrackPrior, weak
 from tests.models.tracking.tracked_series import sent
 from tests.real.lives import WORLDS
 from tests.real.loaders import FOLDER
@@ -26,11 +26,8 @@ Start = tuple[str, list[Measurement], float]
 
 def starts(count: int, seed: int) -> str:
     """By kind of start: how often the safe bound lies beyond the end, and where it lies."""
-    found: dict[str, list[tuple[float, float, float]]] = defaultdict(list)
-    real = list(_real(count, seed)) if FOLDER.is_dir() else []
-    for index, (name, tests, end) in enumerate([*_simulated(count, seed), *real]):
-        found[name].append((safe_bound(tests, np.random.default_rng([seed, index])), tests[-1].progress, end))
-    rows = []
+    real = list(real_starts(count, seed))
+    found, rows = bounds([*simulated_starts(count, seed), *real], seed), []
     for name, outcomes in [*found.items(), ("all", [one for each in found.values() for one in each])]:
         bound, now, end = np.array(outcomes).T
         shares = np.quantile((bound - now) / (end - now), [0.5, 0.95]).tolist()
@@ -44,15 +41,23 @@ def starts(count: int, seed: int) -> str:
     )
 
 
-def safe_bound(tests: Sequence[Measurement], rng: np.random.Generator) -> float:
-    """The 5 % quantile of the end of life."""
+def bounds(of: Iterable[Start], seed: int) -> dict[str, list[tuple[float, float, float]]]:
+    """By kind of start: the safe bound, the cycles tested and the end of each."""
+    found: dict[str, list[tuple[float, float, float]]] = defaultdict(list)
+    for index, (name, tests, end) in enumerate(of):
+        found[name].append((safe_bound(tests, np.random.default_rng([seed, index])), tests[-1].progress, end))
+    return found
+
+
+def safe_bound(tests: Sequence[Measurement], rng: np.random.Generator, prior: TrackPrior | None = None) -> float:
+    """The 5 % quantile of the end of life, under the weak prior unless another is given."""
     now = tests[-1].progress
-    drawn = GRID.posterior(GRID.from_history(weak(tests[0], falling=True), tests), DRAWS, rng)
+    drawn = GRID.posterior(GRID.from_history(prior or weak(tests[0], falling=True), tests), DRAWS, rng)
     end = stated_end(drawn, fraction=0.5, as_of=now, horizon=HORIZON, tests=tests)
     return float(weighted_quantiles(np.minimum(end.ends, HORIZON), end.weight, (0.05,))[0])
 
 
-def _simulated(count: int, seed: int) -> Iterator[Start]:
+def simulated_starts(count: int, seed: int) -> Iterator[Start]:
     """Clutches that stay level, or run in by 3 to 12 %, before they wear evenly, faster and faster, or slower and slower:
     tested until wear begins at the latest."""
     for index in range(count):
@@ -76,10 +81,10 @@ def _course(onset: float, rise: float, settling: float, power: float) -> Callabl
     return course
 
 
-def _real(count: int, seed: int) -> Iterator[Start]:
-    """Real lives cut while they show no wear."""
+def real_starts(count: int, seed: int) -> Iterator[Start]:
+    """Real lives cut while they show no wear; none where their data are not there."""
     found: list[Start] = []
-    for name, world in WORLDS.items():
+    for name, world in WORLDS.items() if FOLDER.is_dir() else ():
         for number, (_, tests, end) in enumerate(world()):
             fallen = [1.0 - test.value / tests[0].value > 0.5 * UNWORN for test in tests]
             unworn = fallen.index(True) if True in fallen else len(tests)

@@ -339,6 +339,12 @@ def test_oil_that_warms_up_within_a_test_is_the_first_thing_to_mend(client: Test
     assert first["code"] == "oil_temperature_moves"
     assert "42 to 78 °C" in first["message"]
     assert "First bring the oil to one temperature" in first["message"]
+    (item,) = client.get("/v1/clutches").json()["items"]
+    assert item["action"] == (
+        "Bring the oil to one temperature, within 10 °C, and repeat the test: the oil went from 42 to 78 °C within the test "
+        "at 0 cycles."
+    )
     body["run_id"], body["cycles"] = "steady", 10
     body["channels"]["oil_temperature_c"] = np.linspace(80.0, 89.0, torque.size).tolist()
     assert "oil_temperature_moves" not in {each["code"] for each in post_run(client, body)["warnings"]}
+    assert "oil to one temperature" not in client.get("/v1/clutches").json()["items"][0]["action"]

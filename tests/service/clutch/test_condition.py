@@ -230,6 +230,10 @@ def advising(test: str, effect: str) -> LatestDiagnosis:
             "Check the measurement before you replace anything: mean COF at 2 bar has risen, which a rig may do too; see",
         ),
         (
+            summary(0.0, status="reached", rig_question="mean COF stepped", oil_question="it went from 40 to 80 °C"), None,
+            "Failure: ", "Bring the oil to one temperature, within 10 °C, and repeat the test: it went from 40 to 80 °C.",
+        ),
+        (
             summary(9000.0, rig_question="mean COF stepped at 7,000 cycles and no maintenance was sent"), None,
             "Normal: ", "Nothing to do: carry on testing.",
         ),
