@@ -37,10 +37,11 @@ from service.readers.preview import ShownColumn, ShownTable
 from service.readers.read_file import preview_file, read_file
 from service.readers.table import Reading
 from service.readers.unit_table import spellings
+from service.runs.channels_run import NEEDED, run_of
 from service.runs.file_names import Suggested, suggested
 from service.runs.rig_profile import Named, fits, named, pattern_for
 from service.runs.suggestion import suggestion_of
-from service.runs.upload import NEEDED, reading_with, run_of
+from service.runs.upload import reading_with
 from storage import clutches, rigs
 from storage.engine.database import Database
 

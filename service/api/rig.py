@@ -23,7 +23,8 @@ class RigColumn(Schema):
 
     title: Annotated[str, StringConstraints(min_length=1, max_length=base.LONGEST_TITLE)] = Field(
         description="Its title in the file, without the unit; `group/title` in files with groups. Of a channel without a"
-        " column `=5 bar`, `=LABEL` of a cell above the table, `=columns` or `=sheets` (a value in their names), `=cells`"
+        " column `=5 bar`, `=LABEL` of a cell above the table, `=columns` or `=sheets` (a value in their names), `=cells`;"
+        " of the time `=100 Hz`"
     )
     channel: ChannelName | None = Field(default=None, description="The channel; null: ignore the column")
     unit: Text | None = Field(default=None, description="Its unit; null: the unit in the file")

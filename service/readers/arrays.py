@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from models.arrays import FloatArray
 from service.errors import InvalidError, Notice
 from service.readers.column_names import column_of, recognised
-from service.readers.constants import in_parts
+from service.readers.constants import VALUE_NAMES, in_parts
 from service.readers.limits import Limits
 from service.readers.meanings import known_channel
 from service.readers.numerals import Stamps, is_stamp
@@ -25,7 +25,6 @@ from service.readers.stated_clocks import UNITS, stated_clock
 from service.readers.table import Clock, FileColumn, Reading, Table, index_of_wanted
 from service.readers.unit_table import conversion, is_unit
 
-_DATA = ("data", "values", "value", "y", "samples")
 #: Factors that a file states beside raw counts; whether they were applied already only its program knows.
 _GAINS = frozenset(
     ["gain", "scale", "scaling", "factor", "slope", "multiplier", "sensitivity", "calibration", "resolution", "lsb"]
@@ -118,7 +117,7 @@ def _paired(tree: Tree) -> Tree:
     for key, value in tree.items():
         base, _, kind = key.rpartition("_")
         header_values = [headers[name] for end in _HEADERS if (name := f"{base}_{end}".lower()) in headers]
-        if isinstance(value, Leaf) and kind.lower() in _DATA and header_values:
+        if isinstance(value, Leaf) and kind.lower() in VALUE_NAMES and header_values:
             paired[base] = {**header_values[0], kind: paired.pop(key)}
     return paired
 
@@ -138,7 +137,7 @@ def _sources(tree: Tree, group: str, depth: int, above: Tree, stamps: Stamps) ->
         path = f"{group}/{name}" if group else name
         if isinstance(node, Mapping):
             lowered = {key.lower(): value for key, value in node.items()}
-            data = next((lowered[key] for key in _DATA if isinstance(lowered.get(key), Leaf)), None)
+            data = next((lowered[key] for key in VALUE_NAMES if isinstance(lowered.get(key), Leaf)), None)
             leaves = {key: leaf for key, leaf in node.items() if isinstance(leaf, Leaf) and leaf is not data}
             remaining = [key for key, leaf in leaves.items() if _rows(leaf)]
             if data is not None and all(known_channel(key) == "time_s" for key in remaining):
@@ -209,7 +208,7 @@ def _referred(leaf: Leaf, rows: int, stamps: Stamps) -> Clock | None:
 
 def _unit(names: Sequence[str], attributes: Tree, beside: Tree, *, whole: bool) -> str:
     """The unit that stands at an array or beside it under one of its names; `whole`: or without any, as it is one column."""
-    at_data = beside if whole and any(key.lower() in _DATA for key in beside) else {}
+    at_data = beside if whole and any(key.lower() in VALUE_NAMES for key in beside) else {}
     named = (stated_unit(name, stated) for stated in (attributes, beside) for name in names)
     return next(filter(None, [unit_of_array(attributes if whole else {}), *named, unit_of_array(at_data)]), "")
 

@@ -28,7 +28,7 @@ from service.readers.column_names import (
     perhaps_the_time,
     several_times,
 )
-from service.readers.constants import constants, stacked_columns, with_constants
+from service.readers.constants import constants, stacked_columns, stated_step, with_constants
 from service.readers.limits import Limits
 from service.readers.long_table import says_valid, valid_rows, widened
 from service.readers.meanings import known_channel
@@ -36,10 +36,11 @@ from service.readers.missing_values import (
     drop_totals,
     mask_stated_marks,
     refuse_no_torque,
-    refuse_other_unit,
     refuse_stand_ins,
 )
 from service.readers.numerals import empty_cells, plain, read_cells
+from service.readers.slips import refuse_slips
+from service.readers.stated_clocks import evenly
 from service.readers.table import ABOVE, NO_MISSING, NO_TIME, Clock, FileColumn, Reading, Table, index_of_wanted, labels
 from service.readers.unit_table import conversion
 
@@ -97,7 +98,7 @@ def to_channels(table: Table, reading: Reading, limits: Limits) -> Channels:
     if table.parts:
         return below_each_other([to_channels(part, reading, limits) for part in _parts(table)])
     table, reading = widened(stacked_columns(with_constants(table, reading), reading), reading)
-    constant = constants(table, reading)
+    constant, step = constants(table, reading), stated_step(table, reading)
     chosen = choose(table.columns, reading)
     series, table, counts = _read(table, chosen, reading, limits)
     notices = list(table.notices)
@@ -105,6 +106,8 @@ def to_channels(table: Table, reading: Reading, limits: Limits) -> Channels:
     columns, first = _chosen_table(columns, table, reading)
     size = next(iter(columns.values())).size
     columns |= {channel: np.full(size, value) for channel, value in constant.items()}
+    if step is not None:
+        columns["time_s"] = evenly(0.0, step, size)
     if reading.reads_all() and "time_s" in columns:
         columns["time_s"] = _continued(columns["time_s"])
     line_in_file = table.line_of
@@ -119,7 +122,7 @@ def to_channels(table: Table, reading: Reading, limits: Limits) -> Channels:
         raise InvalidError(detail, errors=error.errors, total=error.total) from None
     _refuse_standing(columns)
     refuse_no_torque(columns, line_of, reading)
-    refuse_other_unit(columns, line_of, reading)
+    refuse_slips(columns, line_of, reading)
     return Channels(columns=columns, notices=tuple(notices), counts=counts, labels=labels(table.above))
 
 
@@ -169,20 +172,24 @@ def _refuse_standing(columns: Mapping[str, FloatArray]) -> None:
 def _chosen_table(columns: dict[str, FloatArray], table: Table, reading: Reading) -> tuple[dict[str, FloatArray], int]:
     """The one table, or of several below each other the one that is named by its number (`2`, `Sheet/2`), and its first row.
 
-    Titles that only interrupt a table, whose time goes on after them, begin no other.
+    Titles that only interrupt a table, whose time goes on after them, begin no other; where one is named, a clock that goes
+    back does.
     """
     if reading.reads_all():
         return columns, 0
-    time_s = columns.get("time_s")
-    starts = [0, *table.breaks, next(iter(columns.values())).size]
+    time_s, breaks = columns.get("time_s"), table.breaks
+    size = next(iter(columns.values())).size
+    if not breaks and time_s is not None and reading.table not in ("", table.name) and not table.others:
+        breaks = (np.flatnonzero(np.diff(time_s) < 0) + 1).tolist()
+    starts = [0, *breaks, size]
     tables = [f"{table.name}/{number}" if table.name else str(number) for number in range(1, len(starts))]
     if table.breaks and time_s is not None and reading.table not in tables:
         steps = np.diff(time_s)
         # rows that are left out may leave fewer than stood above a title
-        within = all(0 < row <= steps.size for row in table.breaks)
-        if within and all(0 < steps[row - 1] < _LONGEST_PAUSE * np.median(steps) for row in table.breaks):
+        within = all(0 < row <= steps.size for row in breaks)
+        if within and all(0 < steps[row - 1] < _LONGEST_PAUSE * np.median(steps) for row in breaks):
             return columns, 0
-    asked_table = reading.table if table.breaks and reading.table != table.name else ""
+    asked_table = reading.table if breaks and reading.table != table.name else ""
     number = index_of_wanted(tables, asked_table, "table")
     return {name: column[starts[number] : starts[number + 1]] for name, column in columns.items()}, starts[number]
 

@@ -68,8 +68,9 @@ _RANGE = re.compile(
 #: letter that is no prefix of a unit (kNm).
 _WORD_STARTS = re.compile(r"(?<![^\W_])(?=[^\W_°])|(?<=[a-jln-zäöüß])(?=[A-Z])|(?<!°)(?=°)")
 _BRACKET = re.compile(r"[\[({<]([^\[\](){}<>]*(?:\([^()]*\))?)[\])}>]")
-#: What may stand between a name and its unit: a comma, a slash, "in", blanks or underscores.
-_BETWEEN = re.compile(r"\s*[,;:|]\s*|\s*/\s*|\s+in\s+|[\s_]+")
+#: What may stand between a name and its unit: a comma, a slash, "in", blanks or underscores, and dots as R writes for them
+#: (`Pressure..bar.`).
+_BETWEEN = re.compile(r"\s*[,;:|]\s*|\s*/\s*|\s+in\s+|[\s_]+|\.+(?!\d)")
 
 
 def is_time(column: FileColumn) -> bool:
@@ -120,11 +121,11 @@ def _taken_apart(title: str) -> tuple[str, str | None]:
     if known_channel(title):
         return title, None
     for mark in _BETWEEN.finditer(title, max(0, len(title) - LONGEST_UNIT - 4)):  # the longest unit first
-        name, unit = title[: mark.start()].strip(), title[mark.end() :]
+        name, unit = title[: mark.start()].strip(), title[mark.end() :].rstrip(".")
         if name and is_unit(unit):
             channel = meaning(name, unit)[0]
             # a sign parts any name from its unit, a blank only one that is known
-            if (channel and conversion(channel, unit)) or mark[0].strip() not in ("", "_"):
+            if (channel and conversion(channel, unit)) or mark[0].strip(" _."):
                 return name, unit
     return title, None
 

@@ -17,10 +17,15 @@ from numpy.typing import NDArray
 
 from service.channels import CHANNELS
 from service.errors import MAX_QUOTED, InvalidError, Notice
-from service.readers.column_names import column_of
+from service.readers.column_names import choices_of, column_of
+from service.readers.meanings import known_channel
+from service.readers.stated_clocks import in_seconds
 from service.readers.table import CELLS, COLUMNS, SHEETS, ColumnChoice, FileColumn, Reading, Table, labels
 from service.readers.unit_table import conversion, spellings
 
+_NEEDED = {"torque_nm", "speed_rpm", "pressure_bar"}
+#: Names of arrays and columns that say only that they hold values.
+VALUE_NAMES = ("data", "values", "value", "y", "samples", "wert", "messwert", "valeur")
 _NUMBER = re.compile(r"(?P<number>[+-]?\d+(?:[.,]\d+)?)\s*(?P<unit>\S.*)?")
 #: A value with its unit within a title, and what may stand around it.
 _WITHIN = re.compile(
@@ -37,8 +42,26 @@ def constants(table: Table, reading: Reading) -> dict[str, float]:
         return {}
     stated = labels((table.heads or [table.above])[0])
     return {
-        channel: _value(channel, choice, stated) for channel, choice in reading.mapping.items() if choice.is_constant()
+        channel: _value(channel, choice, stated)
+        for channel, choice in reading.mapping.items()
+        if choice.is_constant() and channel != "time_s"
     }
+
+
+def stated_step(table: Table, reading: Reading) -> float | None:
+    """The step between rows [s] that the caller states in place of a column of times: `=100 Hz`, `=10 ms`, or `=LABEL` of
+    one of both above the table. Raises InvalidError where it is neither."""
+    choice = choices_of(reading).get("time_s")
+    if choice is None or not choice.is_constant():
+        return None
+    text, unit = _stated_text("time_s", choice, labels((table.heads or [table.above])[0]))
+    match = _NUMBER.fullmatch(text)
+    unit = (unit or (match["unit"] if match else None) or "").strip("[]() ")
+    number = 0.0 if match is None else float(match["number"].replace(",", "."))
+    if not unit or number <= 0:
+        message = f"map gives time_s {text[:MAX_QUOTED]!r}: it must be a rate or a step, such as =100 Hz or =10 ms"
+        raise InvalidError.of(message, code="invalid_map", pointer="/map", value=text)
+    return in_seconds(number, unit, choice.column[1:], rate=conversion("time_s", unit) is None)
 
 
 def with_constants(table: Table, reading: Reading) -> Table:
@@ -48,6 +71,7 @@ def with_constants(table: Table, reading: Reading) -> Table:
     Raises InvalidError, once it is read, where a value or its unit is not clear.
     """
     asked = {of: own for of, own in reading.mapping.items() if own.is_constant() or own.column == SHEETS}
+    asked.pop("time_s", None)
     if not reading.reads_all() or not asked:
         return table
     width, others = len(table.columns), list(asked)
@@ -100,8 +124,55 @@ def in_parts(tables: Sequence[Table]) -> Table:
     return replace(parts[0], parts=tuple(parts))
 
 
+def beside_each_other(tables: Sequence[Table]) -> Table | None:
+    """Tables of one file that each hold other channels of one record and their times, as one table of which they are the
+    groups; None where one holds a test, or they hold none together."""
+    own = [[_named_by_part(column, table.name) for column in table.columns] for table in tables]
+    held = [{known_channel(column.name) for column in columns} for columns in own]
+    if any(part >= _NEEDED or "time_s" not in part for part in held) or not set().union(*held) >= _NEEDED:
+        return None
+    places = [(table, at) for table in tables for at in range(len(table.columns))]
+    notices: list[Notice] = []
+
+    def read(taken: Mapping[int, str]) -> list[NDArray[Any]]:
+        values: dict[int, NDArray[Any]] = {}
+        for table in tables:
+            of_table = {places[index][1]: index for index in taken if places[index][0] is table}
+            if of_table:
+                read_columns = table.read({at: taken[index] for at, index in of_table.items()})
+                values |= dict(zip(of_table.values(), read_columns, strict=True))
+        notices[:] = [notice for table in tables for notice in table.notices]
+        return [values[index] for index in taken]
+
+    return Table(columns=tuple(column for columns in own for column in columns), read=read, notices=notices)
+
+
+def _named_by_part(column: FileColumn, part: str) -> FileColumn:
+    """A column of a part of a file, by the part's name where its own says only that it holds values."""
+    name = part if column.name.casefold() in VALUE_NAMES else column.name
+    return replace(
+        column, name=name, group=part, title=column.title if name == column.name else f"{part} {column.title}"
+    )
+
+
 def _value(channel: str, choice: ColumnChoice, stated: Mapping[str, str]) -> float:
     """A channel's value as the caller has it, or as it is stated beside the label that the caller names."""
+    text, unit = _stated_text(channel, choice, stated)
+    match = _NUMBER.fullmatch(text)
+    unit = unit or (match["unit"] if match else None) or CHANNELS[channel].unit
+    converted = conversion(channel, unit.strip("[]() "))
+    if match is None or converted is None:
+        message = (
+            f"map gives {channel} the value {text[:MAX_QUOTED]!r}: it must be a number in one of {spellings(channel)}"
+        )
+        raise InvalidError.of(message, code="invalid_map", pointer="/map", value=text)
+    value = np.array([float(match["number"].replace(",", "."))])
+    converted.apply(value)
+    return choice.factor * float(value[0]) + choice.offset
+
+
+def _stated_text(channel: str, choice: ColumnChoice, stated: Mapping[str, str]) -> tuple[str, str | None]:
+    """What the caller has for a value, or stands beside the label that the caller names; and the unit beside it."""
     text, unit = choice.column[1:].strip(), choice.unit
     if not _NUMBER.fullmatch(text):
         texts = {label.rstrip(":= ").casefold(): (label, cell) for label, cell in stated.items()}
@@ -114,17 +185,7 @@ def _value(channel: str, choice: ColumnChoice, stated: Mapping[str, str]) -> flo
             raise InvalidError.of(message, code="no_such_label", pointer="/map", value=text)
         label, text = texts[text.casefold()]
         unit = unit or column_of(label).unit
-    match = _NUMBER.fullmatch(text)
-    unit = unit or (match["unit"] if match else None) or CHANNELS[channel].unit
-    converted = conversion(channel, unit.strip("[]() "))
-    if match is None or converted is None:
-        message = (
-            f"map gives {channel} the value {text[:MAX_QUOTED]!r}: it must be a number in one of {spellings(channel)}"
-        )
-        raise InvalidError.of(message, code="invalid_map", pointer="/map", value=text)
-    value = np.array([float(match["number"].replace(",", "."))])
-    converted.apply(value)
-    return choice.factor * float(value[0]) + choice.offset
+    return text, unit
 
 
 def value_within(text: str, channel: str) -> tuple[float, str] | None:

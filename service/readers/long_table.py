@@ -174,9 +174,9 @@ def _distinct(cells: Sequence[Any]) -> list[str]:
 
 def _time(columns: Sequence[FileColumn], reading: Reading) -> tuple[int, Any] | None:
     """The column of times and its conversion to s."""
-    if reading.time == NO_TIME:
-        return None
     named = choices_of(reading).get("time_s")
+    if reading.time == NO_TIME or (named and named.is_constant()):
+        return None
     places = range(len(columns)) if named else [index for index, column in enumerate(columns) if is_time(column)]
     if len(places) > 1 and not named:
         shown = " and ".join(columns[index].shown() for index in places)

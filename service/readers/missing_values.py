@@ -46,9 +46,9 @@ _MAX_SAMPLED = 1000
 #: plateaus' means has 1e-5, one of their maxima 0.04; of 4,800 pieces of real records one was left out wrongly.
 _BY_CHANCE, _BY_CHANCE_OWN = 0.002, 0.05
 _OWN = {"maxima", "minima", "medians"}
-#: Rows of a torque of zero, and of a higher pressure, that are asked about; less than this share of the largest speed and
-#: pressure there may be none; and times as high as a pressure in another unit is (psi: 14.5). Chosen.
-_MIN_ZEROS, _OF_LARGEST, _OTHER_UNIT = 3, 0.05, 12.0
+#: Rows of a torque of zero that are asked about, and the share of the largest speed and pressure below which there may be
+#: none. Chosen.
+_MIN_ZEROS, _OF_LARGEST = 3, 0.05
 #: Those that stand only beside others.
 _BESIDE = {"numbers", "scatters"}
 #: Those that are not rounded.
@@ -111,30 +111,6 @@ def refuse_no_torque(columns: Mapping[str, FloatArray], line_of: LineOf | None, 
         f"missing={NO_MISSING}"
     )
     raise InvalidError.of(message, code="no_value", pointer=f"/channels/torque_nm/{row}", row=row + 1, value="0")
-
-
-def refuse_other_unit(columns: Mapping[str, FloatArray], line_of: LineOf | None, reading: Reading) -> None:
-    """Raise InvalidError where in some rows the pressure is many times as high as in the others and the torque is not: they
-    are in another unit."""
-    pressure, torque = columns.get("pressure_bar"), columns.get("torque_nm")
-    if reading.missing == NO_MISSING or pressure is None or torque is None or pressure.size < 2 * _MIN_ZEROS:
-        return
-    step = max(1, pressure.size // _MAX_SAMPLED)
-    most = _OTHER_UNIT * float(np.median(np.abs(pressure[::step])))
-    if pressure.max() <= most:
-        return
-    usual = float(np.median(np.abs(torque[::step]))) / max(most / _OTHER_UNIT, 1e-9)
-    high = (pressure > most) & (np.abs(torque) < usual / _OTHER_UNIT * pressure)
-    if np.count_nonzero(high) < _MIN_ZEROS or not usual:
-        return
-    row = int(high.argmax())
-    count = np.count_nonzero(high)
-    message = (
-        f"{place('pressure_bar', row, line_of)} is {pressure[row]:.6g} bar, as high in {count} of {high.size} "
-        "rows, and the torque is no higher than in the others: are these rows in another unit? Write them in one; to use "
-        f"them as they are, add missing={NO_MISSING}"
-    )
-    raise InvalidError.of(message, code="mixed_units", pointer=f"/channels/pressure_bar/{row}", row=row + 1)
 
 
 def refuse_stand_ins(name: str, values: NDArray[Any], line_of: LineOf | None, reading: Reading) -> None:

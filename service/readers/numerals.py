@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from models.arrays import FloatArray
 from service.channels import LineOf, place
 from service.errors import MAX_ERRORS, MAX_QUOTED, FieldError, InvalidError
-from service.readers.table import Reading, Table, marks
+from service.readers.table import ABOVE, Reading, Table, fills_down, marks
 from service.readers.unit_table import is_unit
 
 #: A number: no hexadecimals, no underscores, no words but nan and inf, which `check_columns` refuses with their row. Digits
@@ -34,6 +34,8 @@ def _readable(decimal: str, groups: str) -> re.Pattern[str]:
     return re.compile(rf"[+-]?(?:{grouped}|\d+{d}?\d*(?:[eE][+-]?\d+)?|{d}\d+(?:[eE][+-]?\d+)?)", re.ASCII)
 
 
+#: What stands in a cell for the value above it.
+_DITTO = frozenset(["″", '"', "〃", "''", "“", "”", "„", "do.", "dto.", "dito", "ditto", "idem", "同上"])
 #: A number with its unit behind it.
 _WITH_UNIT = re.compile(
     r"(?P<number>[+−-]? *(?:\d[\d.,'’\u00a0\u202f\u2009]*+|[.,]\d++)(?:[eE][+-]?\d{1,4})?) ?"
@@ -64,7 +66,7 @@ class Numerals:
 
     def __init__(self, reading: Reading) -> None:
         self.decimal = reading.decimal
-        self._missing = {"", *marks(reading.missing)}
+        self._missing, self._fills_down = {"", *marks(reading.missing)}, fills_down(reading.missing)
         self._stamps: dict[int, Stamps] = {}
         self._units: dict[int, str] = {}
         self._origin: dict[bool, int] = {}
@@ -132,9 +134,12 @@ class Numerals:
             if not all(cell in (None, "") or (isinstance(cell, str) and cell.endswith(unit)) for cell in bare):
                 return None
             bare = [(cell or "").removesuffix(unit).rstrip() for cell in bare]
-        gaps = [cell is None or (isinstance(cell, str) and cell.casefold() in self._missing) for cell in bare]
+        gaps = [cell is None or (isinstance(cell, str) and self._is_mark(cell)) for cell in bare]
         values = self._floats(["nan" if gap else cell for cell, gap in zip(bare, gaps, strict=True)])
         return values if values is None or not any(gaps) else np.ma.MaskedArray(values, mask=gaps)
+
+    def _is_mark(self, cell: str) -> bool:
+        return cell.casefold() in self._missing or (self._fills_down and is_ditto(cell))
 
     def _moments(self, index: int, cells: Sequence[Any]) -> NDArray[Any] | None:
         """Dates, times of day, durations or their text; None where they are numbers or of several types."""
@@ -214,12 +219,21 @@ def _shown(cell: Any) -> str:
     return str("" if cell is None else cell).strip()[:MAX_QUOTED]
 
 
+def is_ditto(cell: Any) -> bool:
+    """Whether a cell says that the value above it stands here too; dashes may stand around the mark."""
+    return isinstance(cell, str) and cell.strip("-–— ").casefold() in _DITTO
+
+
 def _remedy(shown: str) -> str:
     """What helps where a cell is empty, or holds a word or a sign that may stand for no value."""
     if not shown:
         return ": fill the cell, or add missing=empty to leave out such rows"
     if shown.startswith("="):
         return ": no program has computed this formula. Open the workbook in Excel or LibreOffice, and save it"
+    if is_ditto(shown):
+        return (
+            f": add missing={ABOVE} to have it stand for the value above it, or missing={shown} to leave out such rows"
+        )
     number = any(map(str.isdigit, shown)) and "#" not in shown  # `1.#QNAN` is none
     return "" if number or "," in shown else f": add missing={shown} to leave out such rows"
 

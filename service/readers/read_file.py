@@ -5,6 +5,7 @@ are read by the same two steps in a process of their own (`sandbox`).
 """
 
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from dataclasses import replace
 from functools import partial
 from pathlib import Path, PurePath
@@ -15,12 +16,12 @@ from service.errors import MAX_QUOTED, InvalidError, Notice
 from service.readers import sandbox
 from service.readers.assemble import Channels, below_each_other, to_channels
 from service.readers.column_names import parse_map
-from service.readers.constants import value_of_part
+from service.readers.constants import beside_each_other, value_of_part
 from service.readers.detect import Format, members, opened, sniff, unpacked
 from service.readers.limits import LIMITS, Limits
 from service.readers.preview import ShownTable, preview
 from service.readers.suggest import Proposal, propose
-from service.readers.table import ALL, SHEETS, ColumnChoice, Reading, index_of_wanted
+from service.readers.table import ALL, SHEETS, ColumnChoice, Reading, Table, index_of_wanted
 from service.readers.text import read_text
 
 #: Files of an archive that are tried, to find the one that holds channels. Chosen; a rig's folder of one test has few.
@@ -64,10 +65,16 @@ def _read(path: Path, filename: str, reading: Reading, limits: Limits, answer: s
         return _in_archive(path, reading, limits, answer)
     if kind is not Format.TEXT:
         return sandbox.read_isolated(kind, path, answer, reading=reading, limits=limits, filename=filename)
+    text = partial(read_text, partial(opened, path, limits), limits=limits, any_encoding=answer == "suggestion")
+    return _answered(text, reading, limits, answer, filename)
+
+
+def _answered(
+    read_table: Callable[[Reading], Table], reading: Reading, limits: Limits, answer: sandbox.Answer, filename: str
+) -> Any:
     if answer == "suggestion":
-        text = partial(read_text, partial(opened, path, limits), limits=limits, any_encoding=True)
-        return propose(text, reading, limits, filename)
-    table = read_text(partial(opened, path, limits), reading, limits)
+        return propose(read_table, reading, limits, filename)
+    table = read_table(reading)
     return preview(table, reading) if answer == "preview" else to_channels(table, reading, limits)
 
 
@@ -92,6 +99,10 @@ def _in_archive(path: Path, reading: Reading, limits: Limits, answer: sandbox.An
         return read(matching[0], "")
     if within:
         return read(within[0], reading.table[len(within[0]) + 1 :])
+    if not reading.table:
+        with ExitStack() as stack:
+            if (beside := _beside(path, names, reading, limits, stack)) is not None:
+                return _answered(lambda _: beside, reading, limits, answer, "")
     records: dict[str, Any] = {}
     refused: list[InvalidError] = []
     for name in names[:_MAX_TRIED]:
@@ -105,6 +116,22 @@ def _in_archive(path: Path, reading: Reading, limits: Limits, answer: sandbox.An
     if answer == "suggestion" and len(records) != 1:
         return _for_all(list(records.values()))
     return list(records.values())[index_of_wanted(list(records) or names, "", "file")]
+
+
+def _beside(path: Path, names: Sequence[str], reading: Reading, limits: Limits, stack: ExitStack) -> Table | None:
+    """The table of an archive's texts that each hold other channels of one record, open as long as `stack`; None where they
+    are anything else."""
+    tables = []
+    for name in names if 1 < len(names) <= _MAX_TRIED else ():
+        plain = stack.enter_context(unpacked(path, name, limits))
+        try:
+            if sniff(plain, name, limits) is not Format.TEXT:
+                return None
+            table = read_text(partial(opened, plain, limits), reading, limits, any_encoding=True)
+        except InvalidError:
+            continue  # a note beside the records
+        tables.append(replace(table, name=PurePath(name).stem))
+    return beside_each_other(tables) if len(tables) > 1 else None
 
 
 def _all_of_archive(names: Sequence[str], read: Callable[[str, Reading], Any], reading: Reading, answer: str) -> Any:
@@ -138,13 +165,16 @@ def _by_name(name: str, channel: str, choice: ColumnChoice) -> ColumnChoice:
 
 
 def _for_all(proposals: Sequence[Proposal]) -> Proposal | None:
-    """How all files of an archive may be read that are read alike but for a constant pressure; None where they are not."""
-    readings = []
-    for proposal in proposals:
-        mapping = dict(proposal.reading.mapping)
-        if "pressure_bar" in mapping and mapping["pressure_bar"].is_constant():
-            mapping["pressure_bar"] = ColumnChoice(column=SHEETS)
-        readings.append(replace(proposal.reading, mapping=mapping, table=ALL))
+    """How all files of an archive may be read that are read alike, but for a value that the name of each states; None where
+    they are not."""
+    readings = [replace(proposal.reading, table=ALL) for proposal in proposals]
+    if any(reading != readings[0] for reading in readings):
+        readings = [replace(own, mapping=dict(map(_by_names, own.mapping.items()))) for own in readings]
     if not readings or any(reading != readings[0] for reading in readings):
         return None
     return replace(proposals[0], reading=readings[0], confidence=min(_ALL, *(own.confidence for own in proposals)))
+
+
+def _by_names(choice: tuple[str, ColumnChoice]) -> tuple[str, ColumnChoice]:
+    """The choice of a channel, with the values that files' names state in place of a constant."""
+    return choice[0], ColumnChoice(column=SHEETS) if choice[1].is_constant() else choice[1]

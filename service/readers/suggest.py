@@ -35,6 +35,8 @@ from service.readers.unit_table import conversion, is_unit
 
 #: The channels that every test needs.
 _NEEDED = ("torque_nm", "speed_rpm", "pressure_bar")
+#: Those that may be constant in each part of a file.
+_STATED = ("pressure_bar", "speed_rpm")
 #: How sure a column's name makes of its channel. Chosen; by a draw of files (tests/lab/files).
 _SURE = {Sense.WHOLE: 1.0, Sense.FOREIGN: 0.98, Sense.PART: 0.8}
 #: The same of a name that says nothing: short for the channel, with a unit of it; a unit alone; short, or with a letter for
@@ -51,14 +53,17 @@ _SIZES: Mapping[str, tuple[tuple[str, ...], float, float]] = {
     "speed_rpm": (("rpm", "1/s"), 5.0, 20_000.0),
     "oil_temperature_c": (("°C", "K"), -40.0, 220.0),
 }
-#: Steps of a time without a unit that are milliseconds, s. Chosen: no rig samples every two seconds for thousands of rows.
+#: Steps of a time without a unit that are milliseconds, s, and rows that are samples. Chosen: no rig samples every two
+#: seconds for thousands of rows, and no test has so many plateaus.
 _MS_STEPS, _MANY_ROWS = 2.0, 500
 #: Things that are mended one after the other.
 _MAX_STEPS = 6
 _MARK_NAMED = re.compile(r"missing=(\S+?)(?:;| to )")
-#: Rivals that differ by less than this share of the largest value hold the same; a pressure that the torque goes by; and a
-#: level of pressure that is that of another part. Chosen.
-_SAME, _FOLLOWS, _SAME_LEVEL = 0.01, 0.8, 0.1
+#: Rivals that differ by less than this share of the largest value hold the same; and a pressure that the torque goes by.
+#: Chosen.
+_SAME, _FOLLOWS = 0.01, 0.8
+#: A rate; and the least that is one of samples, Hz. Chosen: records have at least 10 Hz, rigs oscillate slower.
+_HERTZ, _SLOWEST = re.compile(r"(\d+(?:[.,]\d+)?) ?(k?)Hz"), 10.0
 _UNIT_NAMED = re.compile(r"may be (\S+): state it with map=(\w+):")
 
 
@@ -105,7 +110,8 @@ def _attempt(
             columns = to_channels(table, named, limits).columns
         except InvalidError as error:
             wrong = error.errors[0] if error.errors else None
-            if wrong is not None and wrong.code == "ambiguous" and wrong.pointer == "/time" and not clock:
+            asks = ("ambiguous", "/time"), ("missing_unit", "/channels/time_s")
+            if wrong is not None and (wrong.code, wrong.pointer) in asks and not clock:
                 clock, confidence = True, min(confidence, _CLOCK)  # which of several times
                 continue
             mended = None if wrong is None else _mended(wrong, error.detail, asked, read_table, limits, filename)
@@ -113,21 +119,15 @@ def _attempt(
                 return None
             asked, confidence = mended[0], min(confidence, mended[1])
         else:
-            if not columns.keys() >= {*_NEEDED} or (asked.table == ALL and _comes_back(columns["pressure_bar"])):
+            if not columns.keys() >= {*_NEEDED}:
                 return None
+            timeless = not asked.time and "time_s" not in columns and columns["torque_nm"].size > _MANY_ROWS
+            if timeless and (rate := _rate(table, filename)):
+                named = replace(named, mapping={**named.mapping, "time_s": ColumnChoice(column=rate)})
+                sure = min(sure, _FIRST_OF_SEVERAL)
             confidence = min(confidence, sure, _CONSTANT if asked.table == ALL else 1.0)
             return Proposal(reading=named, confidence=round(confidence, 2), titles=_titles(table, named))
     return None
-
-
-def _comes_back(pressure: FloatArray) -> bool:
-    """Whether a level of pressure [n] comes back after another one: parts with the same levels are tests of their own."""
-    levels: list[float] = []
-    for value in pressure.tolist():
-        if not levels or abs(value - levels[-1]) > _SAME_LEVEL * max(abs(levels[-1]), 1.0):
-            levels.append(value)
-    ordered = np.sort(levels)
-    return bool((np.diff(ordered) < _SAME_LEVEL * np.maximum(ordered[1:], 1.0)).any())
 
 
 def _titles(table: Table, reading: Reading) -> tuple[str, ...]:
@@ -160,24 +160,22 @@ def _named(table: Table, asked: Reading, filename: str, *, clock: bool) -> tuple
             mapping[channel], by_size = _choice(wide, at, channel, wide_reading)
             confidence = min(confidence, sure, by_size) if channel in _NEEDED else confidence
             del free[at]
-    if "pressure_bar" not in mapping and (constant := _constant(table, filename, asked)):
-        mapping["pressure_bar"] = ColumnChoice(column=constant)
-        confidence = min(confidence, _CONSTANT)
-        if constant == COLUMNS:
-            named, sure = _named(table, replace(asked, mapping=_only(asked, constant)), filename, clock=clock)
-            return named, min(sure, confidence)
+    for channel in _STATED:
+        if channel not in mapping and (constant := _constant(table, filename, asked, channel)):
+            mapping[channel] = ColumnChoice(column=constant)
+            confidence = min(confidence, _CONSTANT)
+            if constant == COLUMNS:
+                only = replace(asked, mapping={**asked.mapping, channel: mapping[channel]})
+                named, sure = _named(table, only, filename, clock=clock)
+                return named, min(sure, confidence)
     named = replace(asked, mapping=mapping)
     if wide is not stacked or asked.time or "time_s" in mapping:
         return named, confidence
     at, sure = _time(wide, free, wide_reading, needed=clock)
-    if at is None:
-        return named, confidence
-    mapping["time_s"], by_size = _choice(wide, at, "time_s", wide_reading)
-    return replace(asked, mapping=mapping), min(confidence, sure, by_size)
-
-
-def _only(asked: Reading, constant: str) -> dict[str, ColumnChoice]:
-    return {**asked.mapping, "pressure_bar": ColumnChoice(column=constant)}
+    if at is not None:
+        mapping["time_s"], by_size = _choice(wide, at, "time_s", wide_reading)
+        return replace(asked, mapping=mapping), min(confidence, sure, by_size)
+    return named, confidence
 
 
 def _crossed(table: Table, asked: Reading) -> tuple[Reading, float] | None:
@@ -299,6 +297,8 @@ def _likelihood(column: FileColumn, channel: str) -> float:
     of, sense = meaning(column.name, column.unit)
     if column.unit is None and _ends_in_another_unit(channel, column.name):
         return 0.0
+    if channel != "time_s" and has_noun("time_s", column.name):
+        return 0.0  # the time of another column (`time_Torque`)
     if of is None and column.unit is None:  # what it may be, if it is in the channel's unit
         assumed = meaning(column.name, CHANNELS[channel].unit)
         if has_noun(channel, column.name) or is_short_for(channel, column.name):
@@ -375,30 +375,45 @@ def _time(table: Table, free: Mapping[int, FileColumn], reading: Reading, *, nee
     if not needed and not unitless and (whole or stated):
         return None, 1.0
     scores = {}
-    for at in whole or [at for at, own in free.items() if like_a_time(own) or is_short_for("time_s", own.name)]:
-        read = read_cells(table, {at: "time_s"}, reading)[at]
-        if runs_on(as_seconds(free[at], read)):
+    likely = [at for at, own in free.items() if like_a_time(own) or is_short_for("time_s", own.name)]
+    of_columns = [at for at, own in free.items() if has_noun("time_s", own.name)]  # the same of each, or none of all
+    asked = dict.fromkeys(whole or likely or of_columns, "time_s")
+    read = read_cells(table, asked, reading) if asked else {}
+    if not whole and not likely and any(not np.array_equal(read[at], read[of_columns[0]]) for at in of_columns):
+        return None, 1.0
+    for at in read:
+        if runs_on(as_seconds(free[at], read[at])):
             of, sense = meaning(free[at].name, free[at].unit)
             scores[at] = _SURE.get(sense, 0.0) if of == "time_s" else _UNIT_ALONE
     return _best(scores)
 
 
-def _constant(table: Table, filename: str, asked: Reading) -> str | None:
-    """Where a pressure stands that no column holds: in the titles of columns, in the names of the file's parts or above
-    them, or in the file's name."""
-    within = [value_of_column(column, "pressure_bar") for column in table.columns]
+def _constant(table: Table, filename: str, asked: Reading, channel: str) -> str | None:
+    """Where a channel's value stands that no column holds: in the titles of columns, in the names of the file's parts or
+    above them, or in the file's name."""
+    within = [value_of_column(column, channel) for column in table.columns]
     if len({held[0] for held in within if held}) > 1:
         return COLUMNS
-    if asked.reads_all() and value_of_part(table.name, (table.heads or [table.above])[0], "pressure_bar") is not None:
+    if asked.reads_all() and value_of_part(table.name, (table.heads or [table.above])[0], channel) is not None:
         return SHEETS
     for label, text in labels((table.heads or [table.above])[0]).items():
         name = label.rstrip(":= ")
         own = column_of(name)
         of, sense = meaning(own.name, own.unit)
-        if of == "pressure_bar" and sense in _SURE and re.match(r"[+-]?\d+(?:[.,]\d+)?\s*\S{0,6}$", text):
+        if of == channel and sense in _SURE and re.match(r"[+-]?\d+(?:[.,]\d+)?\s*\S{0,6}$", text):
             return f"={name}"
-    held = value_within(PurePath(filename).stem.replace("_", " ").replace("-", " "), "pressure_bar")
-    return f"={held[0]:g} bar" if held else None
+    held = value_within(PurePath(filename).stem.replace("_", " ").replace("-", " "), channel)
+    return f"={held[0]:g} {CHANNELS[channel].unit}" if held else None
+
+
+def _rate(table: Table, filename: str) -> str | None:
+    """A rate that may be that of the rows, where no column or clock of the file is a time: the only one above the table, or
+    in the file's name."""
+    stated = {f"={label.rstrip(':= ')}": text for label, text in labels(table.above).items()}
+    stated |= {f"={match[0]}": match[0] for match in _HERTZ.finditer(PurePath(filename).stem.replace("_", " "))}
+    rates = {column: match for column, text in stated.items() if (match := _HERTZ.fullmatch(text))}
+    fast = [at for at, match in rates.items() if float(match[1].replace(",", ".")) * 1e3 ** bool(match[2]) >= _SLOWEST]
+    return fast[0] if len(fast) == 1 else None
 
 
 # --- what is wrong besides ---

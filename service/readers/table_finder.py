@@ -14,8 +14,8 @@ from typing import Any
 from service.errors import MAX_QUOTED, InvalidError, Notice
 from service.readers.column_names import bare_unit, column_of, is_counter, recognised, with_unit
 from service.readers.limits import LONGEST_TITLE, LONGEST_UNIT
-from service.readers.meanings import known_channel
-from service.readers.numerals import NUMBER, Stamps, is_stamp, with_unit_apart
+from service.readers.meanings import known_channel, meaning
+from service.readers.numerals import NUMBER, Stamps, is_ditto, is_stamp, with_unit_apart
 from service.readers.stated_clocks import stated_clock
 from service.readers.table import FileColumn, Table, labels
 from service.readers.unit_table import conversion, is_unit
@@ -53,7 +53,7 @@ _BELOW_SUMMARY = re.compile(
     re.IGNORECASE,
 )
 #: What a row begins with that holds a factor for each column.
-_FACTORS = re.compile(r"\w*[ _]?(?:fa[ck]tor|gain|s[ck]al|slope|mult)", re.IGNORECASE)
+_FACTORS = re.compile(r"\w*[ _]?(?:fa[ck]tor|gain|s[ck]al|slope|mult(?!i\b|i_))", re.IGNORECASE)
 NUMERIC = re.compile(
     r"[+−-]? *(\d[\d.,'’\u00a0\u202f\u2009]*+|[.,]\d++)( ?[dDeE][+-]?\d{1,4})?|[+−-]?(nan|inf|infinity)",
     re.IGNORECASE | re.ASCII,
@@ -168,7 +168,7 @@ class DataRows:
         first = sum(map(is_value, self.first_row))
         labelled = (
             place < len(self.first_row)
-            and not is_value(row[place])
+            and not (is_value(row[place]) or is_ditto(row[place]))
             and is_value(self.first_row[place])
             and has_values >= max(2, first - 1)
         )
@@ -242,7 +242,8 @@ def _counted(columns: Sequence[FileColumn], head: Sequence[Sequence[str]]) -> st
     """Which column of whole numbers that is no channel counts samples in steps of several; "" where none does."""
     for place, column in enumerate(columns):
         cells = [row[place] for row in head if len(row) > place]
-        if column.unit or len(cells) < _LONG_RUN or known_channel(column.name) or not all(map(str.isdecimal, cells)):
+        named = column.unit or known_channel(column.name) or is_unit(column.name)  # the milliseconds of a second
+        if named or len(cells) < _LONG_RUN or not all(map(str.isdecimal, cells)):
             continue
         steps = {int(b) - int(a) for a, b in pairwise(cell[:15] for cell in cells)}
         if len(steps) == 1 and max(steps) > 1:
@@ -260,6 +261,7 @@ def find_table(rows: Sequence[Row], comments: frozenset[int], named: Sequence[st
 
     `comments` are rows that may hold titles and no data; `named` are titles that the caller names.
     """
+    rows = _with_definitions(rows)
     runs = list(_runs(rows, comments)) or [(len(rows), 0)]
     rows = [*rows, ()]
     candidates = []
@@ -276,6 +278,24 @@ def find_table(rows: Sequence[Row], comments: frozenset[int], named: Sequence[st
         if best and layout.texts() == best.texts() and not is_footer(rows[layout.start], rows[best.start]):
             return layout
     return None
+
+
+def _with_definitions(rows: Sequence[Row]) -> Sequence[Row]:
+    """The rows with what a list of channels above them defines (`CH1;Torque;...;Nm`) in place of the channels' numbers."""
+    defined: dict[str, str] = {}
+    for row in rows:
+        channel, *cells = map(_text, row) if len(row) > 2 else [""]
+        unit = next((cell for cell in reversed(cells) if is_unit(cell)), "")
+        name = next((cell for cell in cells if cell and known_channel(cell[:LONGEST_TITLE]) and not is_unit(cell)), "")
+        if channel and name and unit and not known_channel(channel[:LONGEST_TITLE]) and not is_value(channel):
+            defined[channel] = f"{name} [{unit}]"
+    if len(defined) < 2:
+        return rows
+    named = [sum(_text(cell) in defined for cell in row) for row in rows]
+    return [
+        [defined.get(_text(cell), cell) for cell in row] if count > 1 else row
+        for row, count in zip(rows, named, strict=True)
+    ]
 
 
 def _runs(rows: Sequence[Row], comments: frozenset[int]) -> Iterator[tuple[int, int]]:
@@ -297,8 +317,16 @@ def _skip_labelled_rows(rows: Sequence[Row], comments: frozenset[int], start: in
     """Where a run begins without its first rows that hold numbers of another kind beside a label (`Length;12;12`), and
     how many those are."""
     run = [index for index in range(start, len(rows)) if index not in comments and not is_blank(rows[index])][:length]
-    labelled = next((k for k, index in enumerate(run) if not is_footer(rows[index], rows[run[length // 2]])), 0)
+    usual = rows[run[length // 2]] if run else ()
+    others = (k for k, at in enumerate(run) if not (is_footer(rows[at], usual) or _numbers_columns(rows[at], usual)))
+    labelled = next(others, 0)
     return (run[labelled], labelled) if run else (start, 0)
+
+
+def _numbers_columns(row: Row, usual: Row) -> bool:
+    """Whether a row counts the columns, as whole numbers where a `usual` row has others too."""
+    counts = [*shown(row)] == [str(k + 1) for k in range(len(row))]
+    return counts and len(row) > 2 and len(row) >= len(usual) and not all(map(str.isdecimal, shown(usual)))
 
 
 def is_blank(row: Row) -> bool:
@@ -340,7 +368,7 @@ def refuse_factors(above: Sequence[Sequence[str]]) -> None:
 def is_footer(row: Row, other: Row) -> bool:
     """Whether a row is none of the table of `other`: it begins with a word where that has none; or has no value."""
     place, cell = next(((place, cell) for place, cell in enumerate(row) if cell not in (None, "")), (0, None))
-    if cell is None or is_value(cell):
+    if cell is None or is_value(cell) or is_ditto(cell):
         return False
     neighbour = other[place] if place < len(other) else None
     return neighbour in (None, "") or is_value(neighbour) or not any(map(is_value, row))
@@ -370,7 +398,8 @@ def _layout(
             continue
         for titles in _titles(rows, above[place:], width, data):
             filled = sum(map(bool, titles))
-            channel_count = 0 if _are_units(titles) else recognised(titles, named)  # `rpm` is both
+            with_units = _beside_units(titles, rows[at + 1])
+            channel_count = 0 if _are_units(titles) else recognised(with_units, named)  # `rpm` is both
             enough = filled >= width if at in comments else filled >= min(2, width) or channel_count
             rank = (
                 channel_count,
@@ -400,6 +429,17 @@ def _layout(
     return Layout(headings=headings, titles=at, start=start, labelled=labelled, score=score)
 
 
+def _beside_units(titles: Sequence[str], below: Row) -> Sequence[str]:
+    """Titles with the units of the row below them, if all that stands there are units."""
+    if not _are_units(below):
+        return titles
+    pairs = zip_longest(titles, map(_text, below[: len(titles)]), fillvalue="")
+    return [
+        f"{title} [{unit}]" if title and bare_unit(unit) and not _BRACKETS.search(title) else title
+        for title, unit in pairs
+    ]
+
+
 def _states_value(row: Row) -> bool:
     """Whether a row is one cell that states a value (`p = 4 bar`): a block's, and no title."""
     texts = list(filter(None, map(_text, row)))
@@ -425,7 +465,7 @@ def _text_rows_above(rows: Sequence[Row], comments: frozenset[int], start: int) 
         row = rows[index]
         if index in comments or not _has_values(row):
             text_rows += [] if is_blank(row) else [index]
-        elif not is_footer(row, rows[start]) and [_text(cell) for cell in row] != [str(k + 1) for k in range(len(row))]:
+        elif not is_footer(row, rows[start]) and not _numbers_columns(row, rows[start]):
             break
         if len(text_rows) == _MAX_TITLE_ROWS:
             break
@@ -451,22 +491,30 @@ def _titles(rows: Sequence[Row], upwards: Sequence[int], width: int, data: Seque
         padded = titles_row + [""] * (size - len(titles_row))
         above += [""] * (size - len(above))
         yield [name or other for name, other in zip(padded, above, strict=False)]
-        yield [f"{other} {name}".strip() for name, other in zip(padded, _filled(above, size), strict=False)]
+        yield [
+            name if other == name else f"{other} {name}".strip()
+            for name, other in zip(padded, _filled(above, size), strict=False)
+        ]
 
 
 def _have_names(rows: Sequence[Row], titles: Sequence[str]) -> bool:
-    """Whether rows of data begin with a name that no title stands above, as R writes them: a word, or numbers that count,
-    where the column after that of the times runs on as times do."""
+    """Whether rows of data begin with a name that no title stands above, as R writes them: a word, or numbers that count
+    where the first title is that of a quantity that counts nothing, or the column after that of the times runs on as times
+    do."""
     first = [_text(row[0]) for row in rows]
     if len(first) < 2 or not any(map(is_value, first)):
         return len(first) > 1 and all(first)
-    names = [column_of(title[:LONGEST_TITLE]).name for title in titles]
-    timed = [place for place, name in enumerate(names) if known_channel(name) == "time_s"]
-    if not timed or not all(cell.isdecimal() and len(cell) < LONGEST_UNIT for cell in first):
+    named = [column_of(title[:LONGEST_TITLE]) for title in titles]
+    channels = [meaning(column.name, column.unit)[0] for column in named]
+    if not all(cell.isdecimal() and len(cell) < LONGEST_UNIT for cell in first):
         return False
-    numbers = [_text(row[timed[0] + 1]).replace(",", ".") for row in rows if len(row) == len(titles) + 1]
-    runs_on = all(NUMBER.fullmatch(cell) for cell in numbers) and all(b > a for a, b in pairwise(map(float, numbers)))
-    return all(int(b) == int(a) + 1 for a, b in pairwise(first)) and runs_on and len(numbers) == len(rows)
+    counts = all(int(b) == int(a) + 1 for a, b in pairwise(first))
+    if "time_s" not in channels:  # neither a pressure nor a speed nor a torque counts the rows
+        return counts and first[0] == "1" and len(first) == _LONG_RUN and channels[0] is not None
+    at = channels.index("time_s") + 1
+    numbers = [_text(row[at]).replace(",", ".") for row in rows if len(row) == len(titles) + 1]
+    runs_on = all(map(NUMBER.fullmatch, numbers)) and all(b > a for a, b in pairwise(map(float, numbers)))
+    return counts and runs_on and len(numbers) == len(rows)
 
 
 def _filled(texts: Sequence[str], size: int) -> list[str]:

@@ -59,6 +59,8 @@ _CLEAR = 3
 _CHINESE = re.compile(rb"(?:[\x00-\x7f]|[\xa1-\xf7][\xa1-\xfe])*")
 #: Cells of which the last is in quotes and goes on; a quotation mark within a cell is no other (3/4").
 _OPEN = re.compile(r'(?:(?:[ \t]*"(?:[^"]|"")*+"[^;,\t|\n]*|(?![ \t]*")[^;,\t|\n]*)[;,\t|\n])*+[ \t]*"(?:[^"]|"")*+')
+#: A quotation mark that is all of a cell: a ditto mark, where no cell is in quotes.
+_DITTO = re.compile(r'(?<![^;,\t|]) ?" ?(?![^;,\t|])')
 #: What is neither in numbers nor in points in time.
 _WORDS = re.compile(r"[^\d \n.,;:|\teETZ/+-]")
 #: The share of lines with a tab of a text that tabs separate. Chosen: title blocks have none.
@@ -296,6 +298,8 @@ def _rows(lines: Sequence[str], separator: str, skipped: int = 0) -> Iterator[tu
     for index, line in numbered:
         if index < skipped or _SEPARATOR_LINE.fullmatch(line):
             continue
+        if '"' in line and separator.strip() and line.count('"') == len(_DITTO.findall(line)):
+            line = _DITTO.sub('""""', line)
         while '"' in line and separator.strip() and _is_open(line) and line.count("\n") < _MAX_CELL_LINES:
             line += "\n" + next(numbered, (0, '"'))[1]
         if comment := _is_comment(line, separator):
@@ -466,10 +470,11 @@ class _DataBody:
 
     def _settle(self, channels: Mapping[int, str]) -> None:
         """Learn the decimal sign from the first cell that can be read in one way; a full stop where no cell has a sign."""
-        doubtful = False
+        doubtful = quoted = False
         for block, *_ in self._blocks():
             if self._numerals.decimal:
                 return
+            quoted |= '"' in block
             if "." in block or ("," in block and (self._separator != "," or '"' in block)):
                 parsed = (cells for _, cells, _ in self._parsed(block) if len(cells) > max(channels))
                 while rows := list(islice(parsed, _SETTLED)):
@@ -477,7 +482,9 @@ class _DataBody:
                     doubtful |= self._numerals.settle(shown)
                     if self._numerals.decimal:
                         return
-        self._numerals.decimal = self._numerals.decimal or ("" if doubtful else ".")
+        # cells that a comma separates have none of their own
+        comma = self._separator == "," and not quoted
+        self._numerals.decimal = self._numerals.decimal or ("" if doubtful and not comma else ".")
 
     def _plain(self, block: str, channels: Mapping[int, str]) -> list[NDArray[Any]] | None:
         """The columns of a block of nothing but numbers: plain ones eight digits at a time, others by jiter (pydantic-core's

@@ -15,7 +15,7 @@ from python_calamine import CalamineWorkbook, SheetTypeEnum, SheetVisibleEnum
 
 from service.errors import InvalidError, Notice
 from service.readers.column_names import named_columns, recognised
-from service.readers.constants import in_parts
+from service.readers.constants import beside_each_other, in_parts
 from service.readers.detect import check_archive
 from service.readers.limits import Limits
 from service.readers.table import Reading, Table, index_of_wanted
@@ -58,6 +58,10 @@ def read_table(path: Path, reading: Reading, limits: Limits) -> Table:
     tables = {name: cells for name, cells in tables.items() if name in visible} or tables
     if reading.reads_all() and tables:
         return in_parts([_table(name, *tables[name], hidden[name], tuple(sheets), limits) for name in tables])
+    if len(tables) > 1:
+        of_all = [_table(name, *tables[name], hidden[name], tuple(sheets), limits) for name in tables]
+        if (beside := beside_each_other(of_all)) is not None:
+            return beside
     name = list(tables)[index_of_wanted(list(tables) or sheets, "", "sheet")]
     table = _table(name, *tables[name], hidden[name], tuple(sheets), limits)
     return replace(table, notices=[*table.notices, TURNED]) if name in on_side else table

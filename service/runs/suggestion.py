@@ -11,21 +11,22 @@ from typing import Any, get_args
 import numpy as np
 
 from models.arrays import FloatArray
-from models.records.cleaning import UnusableRecordError
-from models.records.plateaus import cut_plateaus
 from service.api.rig import ChannelName, FileKindName, RigColumn, RigIn, RigProfile, Suggestion
-from service.clutch.incoming_run import SampledChannels
+from service.clutch.incoming_run import IncomingRun
 from service.errors import InvalidError, ServiceError
 from service.readers.assemble import Channels
 from service.readers.read_file import read_file, suggest_file
-from service.readers.table import NO_TIME, ColumnChoice, Reading
+from service.readers.table import ALL, NO_TIME, ColumnChoice, Reading
+from service.runs.channels_run import holds_no_dwell, run_of, slower_than_samples
 from service.runs.file_names import suggested
 
 #: Rows that are shown.
 _ROWS = 2
-#: A step between rows that is none between samples of plateaus, s, and the confidence that such rows are plateaus. Chosen:
-#: records have at least 10 Hz.
-_LONGEST_STEP, _PLATEAUS = 1.0, 0.8
+#: The confidence that rows which are too far apart for samples are plateaus, and that the first of several tests in a file
+#: is the one that is meant. Chosen.
+_PLATEAUS, _FIRST_OF_SEVERAL = 0.8, 0.5
+#: A level of a part that is that of another one, as a share of it. Chosen.
+_SAME_LEVEL = 0.1
 _CHANNELS: Sequence[ChannelName] = get_args(ChannelName)
 
 
@@ -53,10 +54,14 @@ def suggestion_of(
             reading = replace(reading, mapping=untimed, time=NO_TIME)
             read, kind = read_file(path, filename=filename, reading=reading), "stationary_stribeck"
             confidence = min(confidence, _PLATEAUS)
-    except ServiceError:  # damaged, too large, no table, or busy: the refusal itself stands
+        said = suggested(filename, beside, read.labels)
+        kind = kind or said.named.kind or _kind(read.columns)
+        if _holds_several(read.columns, kind, in_parts=reading.table == ALL):
+            reading, confidence = _first_test(path, filename, reading), min(confidence, _FIRST_OF_SEVERAL)
+            read = read_file(path, filename=filename, reading=reading)
+        run_of(read, IncomingRun(kind=kind, cycles=0.0, run_id=""))
+    except ServiceError:  # damaged, too large, no table, busy, or no run: the refusal itself stands
         return None
-    said = suggested(filename, beside, read.labels)
-    kind = kind or said.named.kind or _kind(read.columns)
     columns = _columns(reading, proposal.titles)
     profile = RigProfile(
         columns=columns,
@@ -85,6 +90,35 @@ def suggestion_of(
         rows=_rows(read),
         profile=profile,
     )
+
+
+def _holds_several(columns: Mapping[str, FloatArray], kind: FileKindName, *, in_parts: bool) -> bool:
+    """Whether a file that was read as a whole holds several tests: dynamic ones in its parts or where the clock goes back;
+    stationary ones in parts with the same levels."""
+    if kind == "dynamic_stribeck":
+        return in_parts or bool("time_s" in columns and (np.diff(columns["time_s"]) < 0).any())
+    return in_parts and all(_comes_back(columns[name]) for name in ("pressure_bar", "speed_rpm"))
+
+
+def _comes_back(values: FloatArray) -> bool:
+    """Whether a level of a channel [n] comes back after another one."""
+    levels: list[float] = []
+    for value in values.tolist():
+        if not levels or abs(value - levels[-1]) > _SAME_LEVEL * max(abs(levels[-1]), 1.0):
+            levels.append(value)
+    ordered = np.sort(levels)
+    return bool((np.diff(ordered) < _SAME_LEVEL * np.maximum(ordered[1:], 1.0)).any())
+
+
+def _first_test(path: Path, filename: str, reading: Reading) -> Reading:
+    """The reading of the first of a file's tests: each is one of its tables, or begins where the clock goes back."""
+    try:
+        read_file(path, filename=filename, reading=replace(reading, table=""))
+    except InvalidError as error:
+        if error.errors and error.errors[0].code == "which_table":
+            return replace(reading, table=error.errors[0].value)
+        raise
+    return replace(reading, table="1")
 
 
 def confirmed_profile(path: Path, rig: str, profile: RigProfile | None, **asked: Any) -> RigIn:
@@ -122,19 +156,3 @@ def _rows(read: Channels) -> list[dict[ChannelName, float]]:
 def _kind(columns: Mapping[str, FloatArray]) -> FileKindName:
     """A record in which nothing stays as it is for a while is a dynamic one."""
     return "dynamic_stribeck" if "time_s" in columns and holds_no_dwell(columns) else "stationary_stribeck"
-
-
-def slower_than_samples(columns: Mapping[str, FloatArray]) -> bool:
-    """Whether rows by their times are plateaus themselves: too far apart to be samples of some."""
-    time_s = columns.get("time_s")
-    slow = time_s is not None and time_s.size > 1 and float(np.median(np.diff(time_s))) >= _LONGEST_STEP
-    return slow and holds_no_dwell(columns)
-
-
-def holds_no_dwell(columns: Mapping[str, FloatArray]) -> bool:
-    """Whether a record by its times is no stationary test: nothing in it stays as it is for a while."""
-    try:
-        cut_plateaus(SampledChannels(columns))
-    except UnusableRecordError:
-        return True
-    return False

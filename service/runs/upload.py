@@ -6,24 +6,13 @@ from pathlib import Path
 
 from service.api.base import Origin
 from service.api.rig import FileKindName, RigProfile
-from service.channels import PLATE_TEMPERATURES, check_columns
-from service.clutch.incoming_run import IncomingRun, name_run
-from service.errors import FieldError, InvalidError, Notice
-from service.readers.assemble import LEFT_OUT, Channels
+from service.clutch.incoming_run import IncomingRun
+from service.errors import InvalidError
 from service.readers.read_file import read_file
-from service.readers.table import NO_TIME, ColumnChoice, Reading
+from service.readers.table import ColumnChoice, Reading
+from service.runs.channels_run import run_of
 from service.runs.rig_profile import Named, named
-from service.runs.suggestion import holds_no_dwell, slower_than_samples, suggestion_of
-
-#: The channels that each kind of run must have, and the channels that it may have.
-NEEDED = {
-    "stationary_stribeck": ("pressure_bar", "speed_rpm", "torque_nm"),
-    "dynamic_stribeck": ("time_s", "pressure_bar", "speed_rpm", "torque_nm"),
-}
-_ALLOWED = {
-    "stationary_stribeck": ("time_s", "oil_temperature_c", *PLATE_TEMPERATURES, "torque_sd_nm"),
-    "dynamic_stribeck": ("oil_temperature_c", *PLATE_TEMPERATURES),
-}
+from service.runs.suggestion import suggestion_of
 
 
 def read_file_run(
@@ -92,40 +81,6 @@ def _read_run(
         file={"filename": filename, "rig": rig, "reading": asdict(reading)},
     )
     return run_of(read, head)
-
-
-def run_of(read: Channels, head: IncomingRun) -> IncomingRun:
-    """The run with the channels that were read. Raises InvalidError where they do not make one of its kind."""
-    kind, columns, notices = head.kind, read.columns, list(read.notices)
-    missing = [name for name in NEEDED[kind] if name not in columns]
-    if missing:
-        errors = [
-            FieldError(pointer=f"/channels/{name}", code="missing", message=f"the file has no channel {name}")
-            for name in missing
-        ]
-        message = f"a {kind} run needs {', '.join(missing)}; channels found: {', '.join(columns) or 'none'}"
-        # a column that was left out may be the missing channel
-        if left_out := next((notice.message for notice in notices if notice.code == LEFT_OUT), ""):
-            message += f"; {left_out}; choose one of them with map={missing[0]}:NAME"
-        raise InvalidError(message, errors=errors)
-    if kind == "stationary_stribeck" and read.counts and holds_no_dwell(columns):
-        message = (
-            "the times in the file only count the rows, so each row was read as a plateau. If the rows are samples, send "
-            "the samples' times"
-        )
-        notices.append(Notice(code="counting_clock", message=message))
-        columns = {name: column for name, column in columns.items() if name != "time_s"}
-        check_columns(columns)  # a plateau has no negative pressure, which a sample may have
-    accepted = (*NEEDED[kind], *_ALLOWED[kind])
-    if kind == "stationary_stribeck" and slower_than_samples(columns):
-        message = (
-            "the rows are too far apart in time for samples of plateaus: if each row is a plateau, send time=none; if they "
-            "are samples, send them at the rate at which they were taken"
-        )
-        raise InvalidError.of(message, code="rows_are_plateaus", pointer="/time", value=NO_TIME)
-    channels = {name: column for name, column in columns.items() if name in accepted}
-    file = {**(head.file or {}), "warnings": [asdict(notice) for notice in notices]}
-    return name_run(replace(head, channels=channels, file=file))
 
 
 def reading_with(profile: RigProfile | None, reading: Reading) -> Reading:

@@ -107,9 +107,104 @@ def test_torques_of_zero_at_standstill_or_without_pressure_are_read(tmp_path: Pa
     assert read_file(tmp_path / "a.csv", filename="a.csv").columns["torque_nm"].size == 18
 
 
-def test_a_level_in_another_unit_is_asked_about(tmp_path: Path) -> None:
-    pressures = [100 * p if p == 4 else p for p in P]
-    assert refused(tmp_path, TITLES + rows(pressures, N, M), "are these rows in another unit") is None
+def changed(channel: str, factor: float, at: slice | int) -> str:
+    """The test with some values of a channel multiplied."""
+    columns = {name: values.copy() for name, values in STACKED.items()}
+    columns[channel][at] *= factor
+    return TITLES + rows(*(np.round(values, 5).tolist() for values in columns.values()))
+
+
+LEVEL = slice(4, 8)
+
+
+@pytest.mark.parametrize(
+    ("channel", "factor"),
+    [
+        ("pressure_bar", 100),
+        ("pressure_bar", 14.5038),
+        ("pressure_bar", 0.1),
+        ("torque_nm", 1e-3),
+        ("speed_rpm", np.pi / 30),
+    ],
+)
+def test_a_level_in_another_unit_is_asked_about(tmp_path: Path, channel: str, factor: float) -> None:
+    assert (
+        refused(tmp_path, changed(channel, factor, LEVEL), rf"{channel}\[4\] .*are these rows in another unit") is None
+    )
+    read = read_file(tmp_path / "a.csv", filename="a.csv", reading=reading_of(missing="none"))
+    assert read.columns[channel][4] == pytest.approx(factor * STACKED[channel][4], rel=1e-3)
+
+
+@pytest.mark.parametrize("channel", ["pressure_bar", "torque_nm", "speed_rpm"])
+@pytest.mark.parametrize("factor", [10, 0.1])
+@pytest.mark.parametrize("row", [0, 5, 11])
+def test_a_misplaced_decimal_point_is_asked_about(tmp_path: Path, channel: str, factor: float, row: int) -> None:
+    assert (
+        refused(tmp_path, changed(channel, factor, row), rf"{channel}\[{row}\] .*its decimal point elsewhere") is None
+    )
+
+
+def test_rows_of_a_record_in_another_unit_are_asked_about(tmp_path: Path) -> None:
+    time = np.arange(400) / 20
+    speed = 300 + 280 * np.sin(0.5 * np.pi * time)
+    torque = 18 - 0.004 * speed
+    speed[150:260] *= np.pi / 30
+    text = "t [s];" + TITLES + rows(*(np.round(own, 4).tolist() for own in (time, 4 + 0 * time, speed, torque)))
+    assert refused(tmp_path, text, r"speed_rpm\[150\] .*as 110 of 400 rows.*in another unit") is None
+
+
+def test_levels_that_differ_are_read(tmp_path: Path) -> None:
+    """Speeds of their own at each pressure, an open clutch with its drag, and a steep curve."""
+    pressures, speeds = [0.02, 0.02, 0.02, 2, 2, 2, 4, 4, 4], [100, 500, 1000, 10, 50, 2500, 60, 300, 2000]
+    torques = [0.4, 0.9, 1.4, 12, 9, 4, 22, 16, 9]
+    (tmp_path / "a.csv").write_text(TITLES + rows(pressures, speeds, torques))
+    assert read_file(tmp_path / "a.csv", filename="a.csv").columns["torque_nm"].tolist() == torques
+
+
+@pytest.mark.parametrize("mark", ["″", '"', '""""', "''", "dito", '-"-', "〃"])
+def test_a_ditto_mark_stands_for_the_value_above(tmp_path: Path, mark: str) -> None:
+    pressures = [p if k % 4 == 0 else mark for k, p in enumerate(P)]
+    (tmp_path / "a.csv").write_text(TITLES + rows(pressures, N, M))
+    assert same(tmp_path / "a.csv").missing == "above"
+
+
+NUMBERED = [str(k + 1) for k in range(12)]
+
+
+@pytest.mark.parametrize("titles", [TITLES, '"Pressure..bar.";"Speed..rpm.";"Torque..Nm."\n', "p.bar;n.rpm;M.Nm\n"])
+@pytest.mark.parametrize("quote", ["", '"'])
+def test_numbers_of_rows_without_a_title_are_left_out(tmp_path: Path, titles: str, quote: str) -> None:
+    """As R's write.table writes them."""
+    (tmp_path / "a.csv").write_text(titles + rows([f"{quote}{k}{quote}" for k in NUMBERED], P, N, M))
+    columns = read_file(tmp_path / "a.csv", filename="a.csv").columns
+    assert [columns[name].tolist() for name in STACKED] == [P, N, M]
+
+
+@pytest.mark.parametrize("titles", ["Nr;p [bar];n [1/min]\n", "p [bar];n [1/min];M [Nm]\n"])
+def test_a_title_too_few_is_refused_where_rows_are_not_numbered(tmp_path: Path, titles: str) -> None:
+    first = NUMBERED if titles.startswith("Nr") else [f"{k}.5" for k in NUMBERED]
+    assert refused(tmp_path, titles + rows(first, P, N, M), "must have 3 cells, got 4") is None
+
+
+@pytest.mark.parametrize("units", ["", "bar;1/min;Nm\n"])
+def test_numbers_of_columns_are_none_of_the_rows(tmp_path: Path, units: str) -> None:
+    (tmp_path / "a.csv").write_text((TITLES if not units else "p;n;M\n" + units) + "1;2;3\n" + rows(P, N, M))
+    read = read_file(tmp_path / "a.csv", filename="a.csv")
+    assert read.columns["torque_nm"].tolist() == M
+    assert any("1 line above the first row" in notice.message for notice in read.notices)
+
+
+def test_a_list_of_channels_above_names_the_columns(tmp_path: Path) -> None:
+    """As loggers write it."""
+    text = "CH,Signal,Range,Unit\nCH1,Pressure,10V,bar\nCH2,Speed,10V,rpm\nCH3,Torque,5V,Nm\n\nNo,CH1,CH2,CH3\n"
+    (tmp_path / "a.csv").write_text(text + rows(NUMBERED, P, N, M, separator=","))
+    assert read_file(tmp_path / "a.csv", filename="a.csv").columns["speed_rpm"].tolist() == N
+
+
+def test_a_point_in_cells_that_commas_separate_is_the_decimal_sign(tmp_path: Path) -> None:
+    text = TITLES.replace(";", ",") + rows(P, [f"{n / 1000:.3f}" for n in N], M, separator=",")
+    (tmp_path / "a.csv").write_text(text.replace("1/min", "krpm"))
+    assert read_file(tmp_path / "a.csv", filename="a.csv").columns["speed_rpm"].tolist() == pytest.approx(N)
 
 
 STATISTICS = {

@@ -11,6 +11,7 @@ from service.errors import InvalidError
 from service.readers.read_file import preview_file, read_file, reading_of
 from service.readers.table import Reading
 from service.runs.suggestion import suggestion_of
+from service.runs.upload import reading_with
 from tests.service.readers.sample_files import read_content
 
 SPEEDS = [20.0, 120.0, 520.0, 1970.0]
@@ -131,3 +132,37 @@ def test_a_title_that_is_a_unit_of_time_names_the_time(tmp_path: Path, title: st
     rows = [f"{t};{name};{value + t};{unit}" for t in range(3) for name, (unit, value) in names.items()]
     long = "\n".join([f"{title};PID;VALUE;UNITS", *rows]) + "\n"
     assert read_content(tmp_path, long).columns["time_s"].tolist() == pytest.approx([0, factor, 2 * factor])
+
+
+UNTIMED = "n [1/min];M [Nm];p [bar]\n" + "".join(f"{300 + k % 200};{20 + 0.01 * (k % 200)};4\n" for k in range(600))
+
+
+@pytest.mark.parametrize("stated", ["=100 Hz", "=10 ms", "=0.1 kHz", "=0,01 s", "=f_A"])
+def test_a_rate_or_a_step_stands_for_times(tmp_path: Path, stated: str) -> None:
+    read = read_content(tmp_path, f"f_A;100;Hz\n{UNTIMED}", f"time_s:{stated}")
+    np.testing.assert_allclose(read.columns["time_s"], 0.01 * np.arange(600))
+
+
+@pytest.mark.parametrize("stated", ["=100", "=0 Hz", "=5 bar"])
+def test_what_is_no_rate_is_refused(tmp_path: Path, stated: str) -> None:
+    with pytest.raises(InvalidError, match=r"must be a rate or a step|must be one of"):
+        read_content(tmp_path, UNTIMED, f"time_s:{stated}")
+
+
+@pytest.mark.parametrize(
+    ("name", "above", "expected"),
+    [
+        ("a_100Hz.csv", "", "=100Hz"),
+        ("a.csv", "f_A;100;Hz\n", "=f_A"),
+        ("a.csv", "f_osc;0.25;Hz\n", None),
+        ("a.csv", "", None),
+    ],
+)
+def test_a_rate_that_is_stated_once_is_suggested(tmp_path: Path, name: str, above: str, expected: str | None) -> None:
+    """The frequency of an oscillation is none; without a rate nothing is suggested that gives no run."""
+    (tmp_path / name).write_text(above + UNTIMED)
+    suggestion = suggestion_of(tmp_path / name, filename=name, reading=Reading(), kind="dynamic_stribeck")
+    assert (None if suggestion is None else suggestion.map["time_s"]) == expected
+    if suggestion is not None:
+        profile = reading_with(suggestion.profile, Reading())
+        assert read_file(tmp_path / name, filename=name, reading=profile).columns["time_s"][-1] == pytest.approx(5.99)

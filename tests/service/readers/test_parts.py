@@ -2,7 +2,7 @@
 
 import io
 import zipfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 
 import h5py
@@ -13,7 +13,7 @@ import scipy.io
 from nptdms import ChannelObject, GroupObject, TdmsWriter  # type: ignore[import-untyped]
 
 from models.arrays import FloatArray
-from service.api.rig import Suggestion
+from service.api.rig import FileKindName, Suggestion
 from service.errors import InvalidError
 from service.readers.read_file import read_file, reading_of
 from service.readers.table import Reading
@@ -46,18 +46,36 @@ def blocks(block: Callable[[float, list[float]], str]) -> str:
     return "".join(block(pressure, torques) for pressure, torques in TORQUES.items())
 
 
-def suggested(path: Path) -> Suggestion:
+def book(path: Path, sheets: Mapping[str, Sequence[Sequence[object]]]) -> None:
+    """A workbook of sheets with the rows given."""
+    written = openpyxl.Workbook()
+    written.remove(written.active)
+    for name, cells in sheets.items():
+        sheet = written.create_sheet(name)
+        for row in cells:
+            sheet.append(list(row))
+    written.save(path)
+
+
+def pairs(first: Iterable[float], second: Iterable[float]) -> list[list[float]]:
+    """Rows of two columns."""
+    return [[float(one), float(other)] for one, other in zip(first, second, strict=True)]
+
+
+def suggested(path: Path, kind: FileKindName = "stationary_stribeck") -> Suggestion:
     """What is suggested of a file, which is not read without a question."""
     with pytest.raises(InvalidError) as caught:
-        read_file_run(path, filename=path.name, kind="stationary_stribeck", cycles=0)
+        read_file_run(path, filename=path.name, kind=kind, cycles=0)
     assert isinstance(caught.value.suggestion, Suggestion), caught.value.detail
     return caught.value.suggestion
 
 
-def same(path: Path, expected: Mapping[str, FloatArray] = STACKED) -> Suggestion:
+def same(
+    path: Path, expected: Mapping[str, FloatArray] = STACKED, kind: FileKindName = "stationary_stribeck"
+) -> Suggestion:
     """What is suggested, by which the file gives the expected channels."""
-    suggestion = suggested(path)
-    drawn = Drawn(path=path, kind="stationary_stribeck", truth=expected, writer="", language="")
+    suggestion = suggested(path, kind)
+    drawn = Drawn(path=path, kind=kind, truth=expected, writer="", language="")
     got = confirmed(drawn, suggestion)
     for channel, values in expected.items():
         np.testing.assert_allclose(got[channel], values, rtol=1e-9, err_msg=channel)
@@ -117,17 +135,84 @@ def test_sheets_whose_names_say_nothing(tmp_path: Path, label: bool) -> None:
 
 
 def test_sheets_of_the_same_levels_are_tests_of_their_own(tmp_path: Path) -> None:
-    book = openpyxl.Workbook()
-    book.remove(book.active)
-    for name in ("before", "after"):
-        sheet = book.create_sheet(name)
-        sheet.append(["p [bar]", "n [1/min]", "M [Nm]"])
-        for row in zip(*STACKED.values(), strict=True):
-            sheet.append([float(value) for value in row])
-    book.save(tmp_path / "a.xlsx")
-    with pytest.raises(InvalidError, match="holds 2 sheets") as caught:
-        read_file_run(tmp_path / "a.xlsx", filename="a.xlsx", kind="stationary_stribeck", cycles=0)
-    assert caught.value.suggestion is None or caught.value.suggestion.confidence <= 0.5  # type: ignore[attr-defined]
+    cells = [["p [bar]", "n [1/min]", "M [Nm]"], *np.transpose([*STACKED.values()]).tolist()]
+    book(tmp_path / "a.xlsx", {"before": cells, "after": cells})
+    suggestion = same(tmp_path / "a.xlsx")
+    assert (suggestion.table, suggestion.confidence) == ("before", 0.5)
+
+
+BY_SPEED = {speed: [torques[at] for torques in TORQUES.values()] for at, speed in enumerate(SPEEDS)}
+
+
+def test_sheets_of_a_speed_each_are_one_test(tmp_path: Path) -> None:
+    """The pressures come back in each part; the speeds do not."""
+    book(tmp_path / "a.xlsx", {f"{n:g} rpm": [["p [bar]", "M [Nm]"], *pairs(TORQUES, m)] for n, m in BY_SPEED.items()})
+    assert same(tmp_path / "a.xlsx", ACROSS).map["speed_rpm"] == "=sheets"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "".join(f"n = {n:g} 1/min\np [bar];M [Nm]\n{rows([*TORQUES], m)}\n" for n, m in BY_SPEED.items()),
+        "p [bar];" + ";".join(f"M @ {n:g} rpm [Nm]" for n in SPEEDS) + "\n" + rows([*TORQUES], *BY_SPEED.values()),
+    ],
+    ids=["blocks", "columns"],
+)
+def test_a_speed_stands_above_blocks_or_in_titles(tmp_path: Path, text: str) -> None:
+    (tmp_path / "a.csv").write_text(text)
+    same(tmp_path / "a.csv", ACROSS)
+
+
+WHOLE = ("p [bar];n [1/min];M [Nm]\n", [*STACKED.values()])
+
+
+def test_files_of_the_same_levels_are_tests_of_their_own(tmp_path: Path) -> None:
+    with zipfile.ZipFile(tmp_path / "a.zip", "w") as archive:
+        for name in ("run1.csv", "run2.csv"):
+            archive.writestr(name, WHOLE[0] + rows(*WHOLE[1]))
+    suggestion = same(tmp_path / "a.zip")
+    assert (suggestion.table, suggestion.confidence) == ("run1.csv", 0.5)
+
+
+def test_blocks_of_the_same_levels_are_tests_of_their_own(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text(2 * (WHOLE[0] + rows(*WHOLE[1]) + "\n"))
+    assert same(tmp_path / "a.csv").table == "1"
+
+
+OSCILLATING = 300 + 280 * np.sin(np.pi * np.arange(400) / 40 + 0.3)
+DYNAMIC = {
+    "time_s": np.arange(400) / 20,
+    "pressure_bar": np.full(400, 4.0),
+    "speed_rpm": OSCILLATING,
+    "torque_nm": 18 - 0.004 * OSCILLATING,
+}
+DYNAMIC_TITLES = ["t [s]", "p [bar]", "n [1/min]", "M [Nm]"]
+
+
+@pytest.mark.parametrize("titles", [";".join(DYNAMIC_TITLES), "Time;Pressure;Speed;Torque"], ids=["units", "no units"])
+@pytest.mark.parametrize("between", ["", "\n{}\n"], ids=["rows alone", "titles again"])
+def test_of_dynamic_tests_below_each_other_the_first_is_suggested(tmp_path: Path, titles: str, between: str) -> None:
+    body = rows(*(column.tolist() for column in DYNAMIC.values()))
+    (tmp_path / "a.csv").write_text(f"{titles}\n{body}{between.format(titles)}{body}")
+    suggestion = same(tmp_path / "a.csv", DYNAMIC, "dynamic_stribeck")
+    assert (suggestion.table, suggestion.confidence) == ("1", 0.5)
+
+
+def test_sheets_of_a_channel_each_are_one_record(tmp_path: Path) -> None:
+    units = {"torque_nm": "Nm", "speed_rpm": "rpm", "pressure_bar": "bar"}
+    sheets = {
+        channel.partition("_")[0]: [["Time [s]", f"Value [{unit}]"], *pairs(DYNAMIC["time_s"], DYNAMIC[channel])]
+        for channel, unit in units.items()
+    }
+    book(tmp_path / "a.xlsx", sheets)
+    with zipfile.ZipFile(tmp_path / "a.zip", "w") as archive:
+        archive.writestr("readme.txt", "see the report\n")
+        for name, (titles, *cells) in sheets.items():
+            archive.writestr(f"{name}.csv", ";".join(titles) + "\n" + rows(*zip(*cells, strict=True)))
+    for name in ("a.xlsx", "a.zip"):
+        columns = read_file(tmp_path / name, filename=name).columns
+        for channel, values in DYNAMIC.items():
+            np.testing.assert_allclose(columns[channel], values, err_msg=channel)
 
 
 @pytest.mark.parametrize("name", ["{} bar", "p_{}bar", "p={} bar", "level {}"])

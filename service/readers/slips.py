@@ -1,0 +1,146 @@
+"""Rows of a run in which a number is in another unit than in all others, or has its decimal point elsewhere.
+
+Friction tells it: torque per pressure changes with speed and wear by some ten percent, and in rows of another unit by its
+factor. A speed has the other rows' levels for a witness. Such rows are refused; `missing` settles what they are.
+"""
+
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from models.arrays import FloatArray
+from service.channels import CHANNELS, RADIANS_PER_SECOND_PER_RPM, LineOf, place
+from service.errors import InvalidError
+from service.readers.table import NO_MISSING, Reading
+
+#: Factors between units of a channel, and those of a misplaced decimal point.
+_UNITS: Mapping[str, Sequence[float]] = {
+    "pressure_bar": (14.5038, 100.0, 0.1, 1000.0, 1e5, 0.0689476),
+    "torque_nm": (1e-3, 100.0, 1000.0),
+    "speed_rpm": (RADIANS_PER_SECOND_PER_RPM, 1 / 60, 1 / RADIANS_PER_SECOND_PER_RPM, 60.0),
+}
+_POINTS = (10.0, 0.1, 100.0)
+#: Torque per pressure of a row that may be another unit's, off the usual one; how near to it the right one comes; and how
+#: far outside the others' range such a value lies. Chosen: between tests' rows lie three (a steep curve at 20 rpm and at
+#: 3,000), and the least factor but for psi is ten.
+_OFF, _NEAR, _OUTSIDE = 5.0, 1.6, 1.25
+#: Rows of a sampled record that are no noise, rows of any run by which the others are known, and groups that are looked at.
+_MIN_SAMPLES, _MIN_ROWS, _MAX_GROUPS = 3, 6, 100
+#: Shares of the largest or usual value below which a clutch is open or at rest, by which levels differ, and by which one
+#: is that of other rows. Chosen.
+_AT_REST, _LEVEL, _SAME = 0.05, 0.2, 0.02
+#: A step of a logarithm that is none of a unit. Chosen: less than half of the least, that of rad/s (2.26).
+_SMOOTH = 0.9
+
+
+def refuse_slips(columns: Mapping[str, FloatArray], line_of: LineOf | None, reading: Reading) -> None:
+    """Raise InvalidError naming the first row of those in which a pressure, torque or speed is in another unit, or has its
+    decimal point elsewhere."""
+    needed = [columns.get(name) for name in ("pressure_bar", "speed_rpm", "torque_nm")]
+    pressure, speed, torque = needed
+    if reading.missing == NO_MISSING or pressure is None or speed is None or torque is None or speed.size < _MIN_ROWS:
+        return
+    sampled = "time_s" in columns
+    found = _by_friction(pressure, speed, torque, sampled=sampled) or _by_levels(pressure, speed, sampled=sampled)
+    found = found or (_by_jumps(speed) if sampled else None)
+    if found is None:
+        return
+    channel, rows, factor = found
+    first, unit, value = int(rows[0]), CHANNELS[channel].unit, columns[channel][rows[0]]
+    more = f", as {rows.size} of {speed.size} rows" if rows.size > 1 else ""
+    question = "another unit" if rows.size > 1 else "its decimal point elsewhere"
+    message = (
+        f"{place(channel, first, line_of)} is {value:.6g} {unit}{more}: {factor:.4g} times what the other rows suggest; "
+        f"{'are these rows in' if rows.size > 1 else 'has this number'} {question}? Correct the file; to use the values as "
+        f"they are, add missing={NO_MISSING}"
+    )
+    raise InvalidError.of(message, code="mixed_units", pointer=f"/channels/{channel}/{first}", row=first + 1)
+
+
+_Found = tuple[str, NDArray[np.intp], float]
+
+
+def _by_friction(pressure: FloatArray, speed: FloatArray, torque: FloatArray, *, sampled: bool) -> _Found | None:
+    """The channel, the rows and the factor of a pressure or torque that friction contradicts."""
+    size = np.abs(torque)
+    share = _AT_REST if sampled else 0.0
+    slips = (np.abs(speed) > share * np.abs(speed).max()) & (pressure > share * np.median(pressure)) & (size > 0)
+    if np.count_nonzero(slips) < _MIN_ROWS:
+        return None
+    ratio = np.divide(size, pressure, out=np.ones_like(size), where=slips)
+    usual = float(np.median(ratio[slips]))
+    off = slips & ((ratio * _OFF < usual) | (ratio > _OFF * usual))
+    fine = slips & ~off
+    if not off.any() or 2 * np.count_nonzero(off) > np.count_nonzero(slips):
+        return None
+    ends = np.flatnonzero(np.diff(np.concatenate([[0], off.view(np.int8), [0]])))
+    for start, end in zip(ends[::2][:_MAX_GROUPS], ends[1::2], strict=False):
+        if sampled and end - start < _MIN_SAMPLES:
+            continue
+        rows = np.arange(start, end)
+        for channel, values, power in (("pressure_bar", pressure, -1), ("torque_nm", size, 1)):
+            value, low, high = float(np.median(values[rows])), values[fine].min(), values[fine].max()
+            if low / _OUTSIDE <= value <= high * _OUTSIDE:
+                continue
+            for factor in (*_UNITS[channel], *(() if sampled else _POINTS)):
+                right = float(np.median(ratio[rows])) / factor**power / usual
+                if 1 / _NEAR < right < _NEAR and low / _OUTSIDE <= value / factor <= high * _OUTSIDE:
+                    return channel, rows, factor
+    return None
+
+
+def _by_levels(pressure: FloatArray, speed: FloatArray, *, sampled: bool) -> _Found | None:
+    """The rows of a level of pressure whose speeds, or one of them, are those of the other levels but for a factor."""
+    steps = np.abs(np.diff(pressure)) > _LEVEL * np.maximum(np.abs(pressure[1:]), np.abs(pressure[:-1]))
+    ends = [0, *(np.flatnonzero(steps) + 1).tolist(), speed.size]
+    blocks = [np.arange(a, b) for a, b in pairwise(ends) if b - a >= _MIN_SAMPLES]
+    if not 1 < len(blocks) <= _MAX_GROUPS:
+        return None
+    levels = [_levels(speed[rows], _MIN_SAMPLES if sampled else 1) for rows in blocks]
+    for rows, own, at in zip(blocks, levels, range(len(blocks)), strict=True):
+        others = np.concatenate([held for k, held in enumerate(levels) if k != at])
+        strange = own[~_among(own, others)]
+        if own.size < _MIN_SAMPLES or others.size < _MIN_SAMPLES or not strange.size:
+            continue
+        alone = strange.size == 1 and not sampled and len(blocks) > 2
+        if strange.size < max(_MIN_SAMPLES, own.size / 2) and not alone:
+            continue
+        for factor in _POINTS if alone else _UNITS["speed_rpm"]:
+            right = strange / factor
+            if _among(right, others).all() and not (alone and _among(right, own).any()):
+                held = _among(speed[rows], strange)
+                return "speed_rpm", rows[held], factor
+    return None
+
+
+def _levels(values: FloatArray, least: int) -> FloatArray:
+    """The levels of a column [n] that hold for `least` rows."""
+    ends = np.flatnonzero(np.abs(np.diff(values)) > _LEVEL / 2 * np.maximum(np.abs(values[1:]), 1.0)) + 1
+    parts = np.split(values, ends) if ends.size < values.size / least else []
+    return np.array([float(np.median(part)) for part in parts if part.size >= least])
+
+
+def _among(values: FloatArray, others: FloatArray) -> NDArray[np.bool_]:
+    """Which values [n] are some of the others [m]."""
+    return np.asarray((np.abs(values[:, None] - others) <= _SAME * np.abs(others)).any(axis=1))
+
+
+def _by_jumps(speed: FloatArray) -> _Found | None:
+    """The rows between two jumps of a sampled speed, to a multiple and back, where it changes little from row to row."""
+    size = np.abs(speed)
+    logs = np.log(np.where(size > 0, size, np.nan))
+    steps = np.diff(logs)
+    smooth = np.abs(steps) < _SMOOTH
+    jumps = np.flatnonzero(~smooth[1:-1] & smooth[:-2] & smooth[2:]) + 1
+    if not 1 < jumps.size <= _MAX_GROUPS:
+        return None
+    off = steps[jumps] - (steps[jumps - 1] + steps[jumps + 1]) / 2
+    for factor in _UNITS["speed_rpm"]:
+        to, back = (jumps[np.abs(off - sign * np.log(factor)) < 2 * _SAME] for sign in (1, -1))
+        for start in to:
+            end = next((int(at) for at in back if at > start + _MIN_SAMPLES), None)
+            if end is not None:
+                return "speed_rpm", np.arange(start + 1, end + 1), factor
+    return None
