@@ -29,8 +29,8 @@ _OFF, _NEAR, _OUTSIDE = 5.0, 1.6, 1.25
 #: Rows of a sampled record that are no noise, rows of any run by which the others are known, and groups that are looked at.
 _MIN_SAMPLES, _MIN_ROWS, _MAX_GROUPS = 3, 6, 100
 #: Shares of the largest or usual value below which a clutch is open or at rest, by which levels differ, and by which one
-#: is that of other rows. Chosen.
-_AT_REST, _LEVEL, _SAME = 0.05, 0.2, 0.02
+#: is that of other rows; and a speed's noise as a share of the largest speed. Chosen.
+_AT_REST, _LEVEL, _SAME, _NOISE = 0.05, 0.2, 0.02, 0.005
 #: A step of a logarithm that is none of a unit. Chosen: less than half of the least, that of rad/s (2.26).
 _SMOOTH = 0.9
 
@@ -101,17 +101,18 @@ def _by_levels(pressure: FloatArray, speed: FloatArray, *, sampled: bool) -> _Fo
     levels = [_levels(speed[rows], _MIN_SAMPLES if sampled else 1) for rows in blocks]
     for rows, own, at in zip(blocks, levels, range(len(blocks)), strict=True):
         others = np.concatenate([held for k, held in enumerate(levels) if k != at])
-        strange = own[~_among(own, others)]
-        if own.size < _MIN_SAMPLES or others.size < _MIN_SAMPLES or not strange.size:
+        if min(own.size, others.size) < _MIN_SAMPLES:
             continue
-        alone = strange.size == 1 and not sampled and len(blocks) > 2
-        if strange.size < max(_MIN_SAMPLES, own.size / 2) and not alone:
-            continue
-        for factor in _POINTS if alone else _UNITS["speed_rpm"]:
+        noise, strange = _NOISE * float(np.abs(others).max()), own[~_among(own, others)]
+        if strange.size >= max(_MIN_SAMPLES, own.size / 2):
+            factors = _UNITS["speed_rpm"]
+        else:  # one number, off by more than its noise
+            strange = own[~_among(own, others, noise)]
+            factors = _POINTS if strange.size == 1 and not sampled and len(blocks) > 2 else ()
+        for factor in factors:
             right = strange / factor
-            if _among(right, others).all() and not (alone and _among(right, own).any()):
-                held = _among(speed[rows], strange)
-                return "speed_rpm", rows[held], factor
+            if _among(right, others).all() and not (factors is _POINTS and _among(right, own, noise).any()):
+                return "speed_rpm", rows[_among(speed[rows], strange)], factor
     return None
 
 
@@ -122,9 +123,9 @@ def _levels(values: FloatArray, least: int) -> FloatArray:
     return np.array([float(np.median(part)) for part in parts if part.size >= least])
 
 
-def _among(values: FloatArray, others: FloatArray) -> NDArray[np.bool_]:
-    """Which values [n] are some of the others [m]."""
-    return np.asarray((np.abs(values[:, None] - others) <= _SAME * np.abs(others)).any(axis=1))
+def _among(values: FloatArray, others: FloatArray, noise: float = 0.0) -> NDArray[np.bool_]:
+    """Which values [n] are some of the others [m], but for `noise`."""
+    return np.asarray((np.abs(values[:, None] - others) <= np.maximum(_SAME * np.abs(others), noise)).any(axis=1))
 
 
 def _by_jumps(speed: FloatArray) -> _Found | None:

@@ -135,9 +135,11 @@ def test_a_level_in_another_unit_is_asked_about(tmp_path: Path, channel: str, fa
     assert read.columns[channel][4] == pytest.approx(factor * STACKED[channel][4], rel=1e-3)
 
 
-@pytest.mark.parametrize("channel", ["pressure_bar", "torque_nm", "speed_rpm"])
-@pytest.mark.parametrize("factor", [10, 0.1])
-@pytest.mark.parametrize("row", [0, 5, 11])
+MISPLACED = [(channel, factor, row) for channel in STACKED for factor in (10, 0.1) for row in (0, 5, 11)]
+MISPLACED.remove(("speed_rpm", 0.1, 5))  # 12 rpm for 120, beside 20 rpm at the other pressures
+
+
+@pytest.mark.parametrize(("channel", "factor", "row"), MISPLACED)
 def test_a_misplaced_decimal_point_is_asked_about(tmp_path: Path, channel: str, factor: float, row: int) -> None:
     assert (
         refused(tmp_path, changed(channel, factor, row), rf"{channel}\[{row}\] .*its decimal point elsewhere") is None
@@ -159,6 +161,16 @@ def test_levels_that_differ_are_read(tmp_path: Path) -> None:
     torques = [0.4, 0.9, 1.4, 12, 9, 4, 22, 16, 9]
     (tmp_path / "a.csv").write_text(TITLES + rows(pressures, speeds, torques))
     assert read_file(tmp_path / "a.csv", filename="a.csv").columns["torque_nm"].tolist() == torques
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_noise_of_a_speed_is_no_misplaced_point(tmp_path: Path, seed: int) -> None:
+    speeds = np.tile([10.0, 50, 100, 200, 1600], 4) + np.random.default_rng(seed).standard_normal(20)
+    pressures = np.repeat([1.5, 3, 6, 8], 5)
+    torques = np.round(4 * pressures * (0.8 + 0.3 * np.exp(-speeds / 180)), 2)
+    text = TITLES + rows(pressures.tolist(), np.round(speeds, 1).tolist(), torques.tolist())
+    (tmp_path / "a.csv").write_text(text)
+    assert read_file(tmp_path / "a.csv", filename="a.csv").columns["speed_rpm"].size == 20
 
 
 @pytest.mark.parametrize("mark", ["″", '"', '""""', "''", "dito", '-"-', "〃"])
