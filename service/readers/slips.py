@@ -99,19 +99,22 @@ def _by_levels(pressure: FloatArray, speed: FloatArray, *, sampled: bool) -> _Fo
     if not 1 < len(blocks) <= _MAX_GROUPS:
         return None
     levels = [_levels(speed[rows], _MIN_SAMPLES if sampled else 1) for rows in blocks]
-    for rows, own, at in zip(blocks, levels, range(len(blocks)), strict=True):
-        others = np.concatenate([held for k, held in enumerate(levels) if k != at])
+    for at, (rows, own) in enumerate(zip(blocks, levels, strict=True)):
+        elsewhere = [held for k, held in enumerate(levels) if k != at]
+        others = np.concatenate(elsewhere)
         if min(own.size, others.size) < _MIN_SAMPLES:
             continue
-        noise, strange = _NOISE * float(np.abs(others).max()), own[~_among(own, others)]
+        strange = own[~_among(own, others)]
         if strange.size >= max(_MIN_SAMPLES, own.size / 2):
-            factors = _UNITS["speed_rpm"]
-        else:  # one number, off by more than its noise
-            strange = own[~_among(own, others, noise)]
-            factors = _POINTS if strange.size == 1 and not sampled and len(blocks) > 2 else ()
-        for factor in factors:
-            right = strange / factor
-            if _among(right, others).all() and not (factors is _POINTS and _among(right, own, noise).any()):
+            for factor in _UNITS["speed_rpm"]:
+                if _among(strange / factor, others).all():
+                    return "speed_rpm", rows[_among(speed[rows], strange)], factor
+        noise = _NOISE * float(np.abs(others).max())
+        strange = own[~_among(own, others, noise)]
+        for factor in _POINTS if strange.size == 1 and not sampled and len(blocks) > 2 else ():
+            # one number alone, without which all levels would have the same speeds
+            right = np.append(np.setdiff1d(own, strange), strange / factor)
+            if all(held.size == own.size and _among(held, right, noise).all() for held in elsewhere):
                 return "speed_rpm", rows[_among(speed[rows], strange)], factor
     return None
 
