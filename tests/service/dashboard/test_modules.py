@@ -437,6 +437,36 @@ def test_the_form_s_first_values_are_the_service_s_defaults(loaded: Callable[[st
     assert shown == {name: filled_in[name] for name in shown}
 
 
+#: A diagnosis that runs, and what its job says at each poll, in place of the service's.
+RUNNING = """async (m) => {
+  const own = globalThis.fetch;
+  const running = { diagnosis_id: "d", status: "running", created_at: "2026-11-02T08:00:00Z" };
+  const steps = [null, { step: "reads the runs", done: 3, of: 10 }, { step: "diagnoses", done: null, of: null }];
+  globalThis.fetch = async (address) => {
+    const { pathname } = new URL(address, location.href);
+    const job = { progress: pathname.includes("/jobs/") ? steps.shift() : null };
+    return new Response(JSON.stringify({ "/c/diagnoses": { items: [running] }, "/v1/jobs/d": job }[pathname] ?? running));
+  };
+  const place = document.createElement("div");
+  const { poll } = m.diagnosisTab(place, { path: "/c", name: () => "c", present: () => ({ runs: 3 }) }, async () => {});
+  const said = [];
+  while (steps.length > 0) {
+    await poll();
+    said.push(/Computing the diagnosis[^…]*…/.exec(place.textContent)?.[0]);
+  }
+  globalThis.fetch = own;
+  return said;
+}"""
+
+
+def test_a_running_diagnosis_says_how_far_it_is(loaded: Callable[[str], Module]) -> None:
+    assert loaded("diagnosis/diagnosis.js").evaluate(RUNNING) == [
+        "Computing the diagnosis (waiting for its turn) …",
+        "Computing the diagnosis (reads the runs, 3 of 10) …",
+        "Computing the diagnosis (diagnoses) …",
+    ]
+
+
 def test_names_that_are_spelt_almost_alike(loaded: Callable[[str], Module]) -> None:
     similar = loaded("sending/similar_names.js")
     for typed in ("bench3-17", "Bench3_017", "bench3-071"):

@@ -44,11 +44,22 @@ export function diagnosisTab(place, reader, changed) {
   async function poll() {
     /** @type {{ body: ListPage<DiagnosisListed>, changed: boolean }} */
     const page = await read(`${path}?limit=1`);
-    due ||= page.changed;
-    if (!due) return;
-    const [newest] = page.body.items;
-    draw(newest ? await report(newest.diagnosis_id) : null);
-    due = false;
+    if (due || page.changed) {
+      due = true; // after an error midway too
+      const [newest] = page.body.items;
+      draw(newest ? await report(newest.diagnosis_id) : null);
+      due = false;
+    }
+    if (latest?.status === "running") await showHowFar(latest);
+  }
+
+  /** @param {DiagnosisOut} running */
+  async function showHowFar({ diagnosis_id: id, created_at: since }) {
+    /** @type {{ body: JobOut }} */
+    const { body } = await read(`/v1/jobs/${encodeURIComponent(id)}`);
+    const { step, done, of } = body.progress ?? { step: "waiting for its turn", done: null, of: null };
+    const count = of ? `, ${done ?? 0} of ${of}` : "";
+    computing(content, `the diagnosis (${step}${count})`, Date.parse(since));
   }
 
   /** @type {(id: string) => Promise<DiagnosisOut>} */
