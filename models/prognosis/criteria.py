@@ -29,12 +29,6 @@ AHEAD = (1.0, 1.25, 1.5, 2.0, 3.0)
 #: The share of the tests that intervals are to hold. Fixed: they are those of 90 %.
 COVERAGE = 0.9
 
-# Mean COF from the parameters' tracks (`from_parameters`)
-
-#: Mean COF from the parameters and its direct track disagree where they are further apart than this many deviations. Chosen;
-#: no table.
-FAR_APART = 3.0
-
 # What a fleet teaches (`fleet`)
 
 #: A clutch with fewer tests than this says too little to teach anything. Chosen; no table.

@@ -177,21 +177,6 @@ class DegradationItem(Answer):
     trajectory: Trajectory = Field(description="The course as tracked, with its 90 % band; empty with too few tests")
 
 
-class Disagreement(Answer):
-    """COF from the parameters minus the direct track, in standard deviations of the difference."""
-
-    now_sd: Real | None = Field(description="For the present value; null if it has no uncertainty")
-    end_of_life_sd: Real | None = Field(description="For the median end of life; null beyond the horizon")
-
-
-class Rebuilt(Answer):
-    """COF from the parameters: mean COF of the Stribeck parameters' own tracks, to compare with its direct track."""
-
-    trajectory: Trajectory = Field(description="Mean COF from the parameters, with its 90 % band")
-    end_of_life_cycles: Quantiles = Field(description="Quantiles of the duty cycles since new at the end of life")
-    disagreement: Disagreement = Field(description="How far it is from the direct track")
-
-
 class SeverityWeighed(Answer):
     """Exponent by which the work of a duty cycle ages this clutch, estimated from the tests of a life with varying duty."""
 
@@ -210,7 +195,6 @@ class Degradation(Answer):
     method: MethodName = Field(description="The filter")
     life: LifeNumber = Field(description="The life that the tracks belong to")
     items: list[DegradationItem] = Field(description="The quantities of this page, by pressure")
-    rebuilt: Rebuilt | None = Field(description="COF from the parameters; null with too few tests")
     severity_estimate: SeverityWeighed | None = Field(
         description="The exponent of severity, estimated from the tests of this life; null if its duty states no "
         "work or hardly varies, with too few tests, or if one quantity was requested"

@@ -15,7 +15,7 @@ from models.friction.stribeck import PARAMETER_NAMES
 from models.prognosis.back_cast import BackCast
 from models.prognosis.criteria import FEWEST_TESTS
 from models.prognosis.first_passage import weighted_quantiles
-from models.prognosis.from_parameters import PressureLevel, slope_paths
+from models.prognosis.slope_paths import PressureLevel, slope_paths
 from models.tracking.filters.grid import Grid
 from models.tracking.posterior import TrackPosterior, mixture
 from service.api.life import ALIASES, LifeNumber
@@ -361,7 +361,7 @@ ParameterTracks = Mapping[tuple[str, float], Track]
 
 
 def pressure_level(measured: MeasuredLife, tracks: ParameterTracks, direct: Track, pressure: float) -> PressureLevel:
-    """What is known at a reference pressure [Pa]: its tracks, and the tests whose fit determines all four parameters.
+    """The tracks at a reference pressure [Pa], and the tests whose fit determines all four parameters.
 
     `direct` is mean COF at that pressure. Raises KeyError where a parameter has no track there.
     """
@@ -382,12 +382,8 @@ def pressure_level(measured: MeasuredLife, tracks: ParameterTracks, direct: Trac
         parameters=np.array([fit.parameters.as_array() for fit in fits]),
         covariance=np.array([fit.unbiased_covariance for fit in fits]),
         parameter_tracks=[tracks[name, pressure][1] for name in PARAMETER_NAMES],
-        tests=series.events,
-        cof_progress=np.array([measurement.progress for measurement in series.measurements]),
-        cof=np.array([measurement.value for measurement in series.measurements]),
-        cof_track=posterior,
+        cof_scatter=float(posterior.weight @ posterior.scatter) / series.measurements[0].value,
         torque_per_cof=measured.geometry.torque_per_cof(pressure if near is None else measured_at[near]),
-        reference_cof=measured.life.reference[pressure][0],
     )
 
 

@@ -1,6 +1,5 @@
 """What a clutch is tracked under shows in every answer: severity, events that shift the level, tests off the track."""
 
-import math
 from pathlib import Path
 from typing import Any
 
@@ -113,28 +112,13 @@ def test_a_severity_or_a_filter_that_is_none_is_refused(client: TestClient, reco
     assert answer.json()["errors"][0]["pointer"].startswith(f"/{next(iter(record))}")
 
 
-def test_rebuilt_mean_cof_agrees_with_its_direct_track(client: TestClient) -> None:
+def test_surfaces_of_torque_fall_along_the_life_and_rise_with_pressure(client: TestClient) -> None:
     before = said(client, "c1")  # the first test
     assert before["model"] == {"name": "baseline", "effects": []}
     assert before["prior"] == {"name": "weak", "version": None, "clutches": 0}
     assert before["warnings"] == []
     assert client.get("/v1/clutches/c1/surfaces").status_code == 404
-    assert client.get("/v1/clutches/c1/degradation").json()["rebuilt"] is None
     post_tests(client, *range(0, 8000, 1000), pressures=(4.0, 5.0, 6.0))
-    found = client.get("/v1/clutches/c1/degradation").json()
-    direct, again = found["items"][0], found["rebuilt"]
-    middle = again["trajectory"]["median"][0]
-    assert middle == pytest.approx(direct["trajectory"]["median"][0], rel=0.02)
-    assert abs(again["disagreement"]["now_sd"]) < 3
-    # medians in logarithms of cycles, over the root mean square of the deviations that the 90 % intervals have
-    both = (again["end_of_life_cycles"], said(client, "c1", method="grid")["end_of_life_cycles"])
-    ends = [{level: math.log(cycles) for level, cycles in each.items()} for each in both]
-    spread = math.sqrt(0.5 * sum(((end["0.95"] - end["0.05"]) / 3.29) ** 2 for end in ends))
-    apart = (ends[0]["0.5"] - ends[1]["0.5"]) / spread
-    assert apart > 0.2, "else an end that is held against itself would agree as well"
-    # the prediction has the courses that are not eq. 6's too, with 1 %
-    assert again["disagreement"]["end_of_life_sd"] == pytest.approx(apart, abs=0.05)
-    assert found["warnings"] == [] or found["warnings"][0]["code"] == "tracks_disagree"
     surfaces = client.get("/v1/clutches/c1/surfaces").json()
     shape = [len(surfaces[name]) for name in ("cycles", "pressure_bar", "speed_rpm")]
     assert shape == [15, 13, 20]

@@ -36,10 +36,6 @@ const CODES = {
     title: "Two methods disagree",
     help: "They compute different remaining lives from the same tests.",
   },
-  tracks_disagree: {
-    title: "Two predictions disagree",
-    help: "Mean COF is predicted in two ways: directly, and from the four Stribeck parameters. The two predictions differ by more than their uncertainty. A diagnosis may show why.",
-  },
 };
 
 /** @type {(warned: Warned[], tests: StribeckItem[]) => HTMLElement} what is odd about the life or its last test */
