@@ -12,8 +12,8 @@ Value = TypeVar("Value")
 
 
 class Same(Generic[Value]):
-    """A value that equals only itself, as a key: what is computed of an array again and again is found without comparing its
-    numbers. None may change it."""
+    """A wrapper that compares by identity, as a cache key: results computed from an array are found without comparing
+    its numbers. None may change it."""
 
     def __init__(self, value: Value) -> None:
         self.value = value

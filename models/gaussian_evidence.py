@@ -13,22 +13,23 @@ from models.arrays import FloatArray
 
 
 def log_sum(logs: FloatArray | list[float]) -> float:
-    """ln Σ e^logs, -inf of none; for a few numbers an order faster than scipy's."""
+    """ln Σ e^logs, -inf without any; for a few numbers ten times as fast as scipy's."""
     return float(np.logaddexp.reduce(np.asarray(logs, dtype=np.float64))) if len(logs) else -np.inf
 
 
 def log_mean(logs: FloatArray | list[float]) -> float:
-    """ln of the mean of e^logs, of at least one."""
+    """ln of the mean of e^logs, for one or more."""
     return log_sum(logs) - float(np.log(len(logs)))
 
 
 def log_normal(off: FloatArray, variance: FloatArray) -> FloatArray:
-    """ln density of what is `off` the mean of a normal, any shape."""
+    """Log density of a normal distribution at a deviation `off` from its mean, any shape."""
     return np.asarray(-0.5 * (np.log(2.0 * np.pi * variance) + off**2 / variance))
 
 
 def log_gain(info: FloatArray, score: FloatArray, sd: FloatArray | float) -> float:
-    """The formula for coefficients of deviations sd [m] together; info [m, m], score [m]; 0 without coefficients.
+    """Log Bayes factor [nats] by the formula for coefficients of prior deviations sd [m] together, from info [m, m] and
+    score [m]; 0 without coefficients.
 
     >>> round(log_gain(np.eye(1), np.array([2.0]), 1.0), 4)  # ½ 4/2 - ½ ln 2
     0.6534
@@ -41,18 +42,19 @@ def log_gain(info: FloatArray, score: FloatArray, sd: FloatArray | float) -> flo
 
 
 def independent(info: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Directions [m, m] (columns) that know nothing of each other, and their information [m] >= 0: what rounding leaves of
-    an information that was projected off may be a little below zero."""
+    """Eigenvectors [m, m] (columns) of an information matrix, and its eigenvalues [m], set to 0 where rounding made
+    them negative."""
     values, vectors = np.linalg.eigh(info)
     return np.maximum(values, 0.0), vectors
 
 
 def log_gain_alone(info: FloatArray, score: FloatArray, sd: FloatArray | float) -> FloatArray:
-    """The formula for each coefficient by itself; info [m] >= 0, score [m], sd as broadcasts."""
+    """Log Bayes factors [nats] by the formula for each coefficient by itself, from info [m] >= 0, score [m] and prior
+    deviations sd (broadcast)."""
     unit = np.square(sd) * info
     return np.asarray(0.5 * (np.square(sd) * np.square(score) / (1 + unit) - np.log1p(unit)), dtype=np.float64)
 
 
 def log_positive(info: FloatArray, score: FloatArray, sd: FloatArray | float) -> FloatArray:
-    """What `log_gain_alone` is more for coefficients that cannot be negative: ln 2Φ(s/√(I + sd⁻²))."""
+    """Addition to `log_gain_alone` [nats] for coefficients that cannot be negative: ln 2Φ(s/√(I + sd⁻²))."""
     return np.asarray(np.log(2.0) + log_ndtr(score / np.sqrt(info + np.power(sd, -2.0))), dtype=np.float64)

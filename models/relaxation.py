@@ -14,14 +14,14 @@ from models.arrays import FloatArray
 
 
 def kept(step: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """k and m of steps Δu >= 0, any shape."""
+    """Relaxation factors k and m of steps Δu >= 0, any shape."""
     keep, tiny = np.exp(-step), step < 1e-4
     return keep, np.where(tiny, 1 - step / 2 + step * step / 6, -np.expm1(-step) / np.where(tiny, 1.0, step))
 
 
 def recursion(keep: FloatArray, gain: FloatArray) -> FloatArray:
-    """y of y_i = keep_i y_{i-1} + gain_i, y_0 = gain_0, along n, in the shape of the gain [..., n] or [..., n, m] for keep
-    [..., n], whose first does not count."""
+    """Solution y of y_i = keep_i y_{i-1} + gain_i, y_0 = gain_0, along n, in the shape of the gain [..., n] or
+    [..., n, m] for keep [..., n], whose first does not count."""
     if gain.size == 0:
         return gain  # LAPACK writes where nothing is
     bands = np.ones((2, keep.size))
@@ -31,8 +31,8 @@ def recursion(keep: FloatArray, gain: FloatArray) -> FloatArray:
 
 
 def relax(time: FloatArray, rate: FloatArray, target: FloatArray, start: float | FloatArray) -> FloatArray:
-    """y [..., n] of dy/dt = rate (target - y), y = start at time[0]; rate [..., n] 1/s > 0, whose integral is taken by
-    trapezoids, target [..., n]. Raises ValueError where time falls."""
+    """Solution y [..., n] of dy/dt = rate (target - y), y = start at time[0]; rate [..., n] 1/s > 0, whose integral is
+    taken by trapezoids, target [..., n]. Raises ValueError where time falls."""
     step = np.diff(time)
     if (step < 0).any():
         raise ValueError(f"time must not fall, but does at row {int((step < 0).argmax()) + 1}")

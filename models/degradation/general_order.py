@@ -47,7 +47,8 @@ class DegradationLaw:
 
 
 def progress_fraction(zeta: Number, scale: Number, exponent: Number) -> FloatArray:
-    """Share of the change that has happened, σ [1 - (1 + ζ/φ)^-ε], σ the product of the signs of φ and ε; broadcast.
+    """Share of the final change that has happened, σ [1 - (1 + ζ/φ)^-ε], σ the product of the signs of φ and ε;
+    broadcast.
 
     Not negative; below 1 in eq. 6. ζ >= 0; beyond the end of a course that ends it stays as it was there. Accurate
     to rounding for the smallest ζ/φ: the power is taken by log1p and expm1.
@@ -68,7 +69,7 @@ def value(zeta: Number, degradation: DegradationLaw) -> FloatArray:
 
 
 def first_passage(level: Number, degradation: DegradationLaw) -> FloatArray:
-    """The ζ at which ξ is `level`: φ [(1 - (level - ξ0)/Δ)^(-1/ε) - 1], or inf where eq. 6 never takes that value.
+    """Progress ζ at which ξ is `level`: φ [(1 - (level - ξ0)/Δ)^(-1/ε) - 1], or inf where eq. 6 never takes that value.
 
     It is monotone, so there is at most one such ζ; a constant (Δ = 0) is at its level from ζ = 0 on. Also inf where ζ
     is beyond what a float holds.

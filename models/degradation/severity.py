@@ -27,7 +27,7 @@ from models.degradation.general_order import Number
 
 
 class SeverityBasis(StrEnum):
-    """What ζ counts."""
+    """The quantity that ζ counts."""
 
     CYCLES = "cycles"
     SLIDING_DISTANCE = "sliding_distance"
@@ -36,7 +36,8 @@ class SeverityBasis(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Block:
-    """Duty cycles that end at `end` cycles; the energy [J] of one, its initial speed [rad/s] and duration [s] where stated.
+    """A block of duty cycles that ends at `end` cycles; the energy [J] of one cycle, its initial speed [rad/s] and
+    duration [s] where stated.
 
     Raises ValueError where `cycles` is not positive or another number is negative or not finite.
     """
@@ -71,7 +72,7 @@ class Block:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Severity:
-    """What ζ counts, and the exponent q in [0, 10] by which severity enters."""
+    """The quantity that ζ counts, and the exponent q in [0, 10] by which severity enters."""
 
     basis: SeverityBasis = SeverityBasis.CYCLES
     exponent: float = 1.0
@@ -83,7 +84,7 @@ class Severity:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SeverityMap:
-    """ζ over cycles: knots (cycles [k], zeta [k]), both ascending from 0, straight between, `rate` dζ/dN beyond.
+    """A piecewise linear map of cycles to ζ: knots (cycles [k], zeta [k]), both ascending from 0, `rate` dζ/dN beyond.
 
     A cycle of ζ is worth `unit` cycles of standard work: by it the ζ of clutches can be compared. `reference` is the work of
     a cycle [J] or [rad] that counts as one, None where ζ is the count of cycles.
@@ -96,13 +97,13 @@ class SeverityMap:
     reference: float | None = None
 
     def progress(self, cycles: Number) -> FloatArray:
-        """ζ at cycles >= 0, any shape."""
+        """Progress ζ at cycles >= 0, any shape."""
         at = np.asarray(cycles, dtype=np.float64)
         beyond = np.maximum(at - self.cycles[-1], 0.0)
         return np.asarray(np.interp(at, self.cycles, self.zeta) + self.rate * beyond)
 
     def cycles_at(self, progress: Number) -> FloatArray:
-        """The inverse: cycles at ζ >= 0; inf where ζ is."""
+        """Cycles at progress ζ >= 0, the inverse of `progress`; inf where ζ is."""
         at = np.asarray(progress, dtype=np.float64)
         beyond = np.maximum(at - self.zeta[-1], 0.0)
         return np.asarray(np.interp(at, self.zeta, self.cycles) + beyond / self.rate)
@@ -113,7 +114,7 @@ IDENTITY = SeverityMap(cycles=np.zeros(1), zeta=np.zeros(1), rate=1.0)
 
 
 def severity_map(severity: Severity, blocks: Sequence[Block]) -> SeverityMap:
-    """ζ over cycles for blocks in any order; cycles that no block covers are as severe as the rest on average.
+    """The map of cycles to ζ for blocks in any order; cycles that no block covers are as severe as the rest on average.
 
     Where blocks overlap the one that ends first counts. The identity where ζ counts cycles, or no block states its severity.
     """
@@ -141,13 +142,15 @@ def severity_map(severity: Severity, blocks: Sequence[Block]) -> SeverityMap:
 
 
 def counted(work: Number, reference: float, exponent: float) -> FloatArray:
-    """How often a cycle of so much work >= 0 counts beside one of the reference's > 0, any shape."""
+    """Weight of a cycle by its work >= 0 relative to the reference's > 0, (work/reference)^exponent within
+    1e-3 ... 1e3, any shape."""
     # a mistyped energy must not end or stop a life
     return np.clip((np.asarray(work, dtype=np.float64) / reference) ** exponent, 1e-3, 1e3)
 
 
 def _pieces(ordered: Sequence[Block], works: Sequence[float | None]) -> list[tuple[float, float | None]]:
-    """Lengths [cycles] and works from 0 to the end of the last block, without overlaps; None where no severity is stated."""
+    """Lengths [cycles] and works of pieces from 0 to the end of the last block, without overlaps; None as work where no
+    severity is stated."""
     pieces: list[tuple[float, float | None]] = []
     reached = 0.0
     for block, work in zip(ordered, works, strict=True):
@@ -161,7 +164,7 @@ def _pieces(ordered: Sequence[Block], works: Sequence[float | None]) -> list[tup
 
 
 def _recent(lengths: FloatArray, rates: FloatArray) -> float:
-    """The mean rate over the cycles that count as recent."""
+    """Mean rate over the recent cycles, the last tenth or at least a thousand."""
     total = float(lengths.sum())
     window = min(total, max(0.1 * total, 1_000.0))  # the last tenth of the cycles, a thousand at least
     ends = np.cumsum(lengths)
@@ -171,7 +174,8 @@ def _recent(lengths: FloatArray, rates: FloatArray) -> float:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DutyProgramme:
-    """Blocks of `cycles` [b] > 0, and what a cycle of each adds to ζ [n, b] > 0, by draw.
+    """A repeated programme of duty blocks: `cycles` [b] > 0 of each, and `rates` [n, b] > 0, the increase of ζ by one
+    cycle, by draw.
 
     Raises ValueError where there is no block or a number is not positive.
     """
@@ -184,7 +188,7 @@ class DutyProgramme:
             raise ValueError("a programme needs a block, and all its cycles and rates must be positive")
 
     def cycles_until(self, progress: FloatArray) -> FloatArray:
-        """The cycles [n] after which ζ has gone on by `progress` [n] >= 0; inf where that is."""
+        """Cycles [n] after which ζ has increased by `progress` [n] >= 0; inf where that is."""
         steps = self.rates * self.cycles
         ends = np.cumsum(steps, axis=1)
         reached = np.isfinite(progress)
@@ -198,7 +202,7 @@ class DutyProgramme:
         return np.where(reached, passes * begun[-1] + begun[block] + into * self.cycles[block], np.inf)
 
     def blocks_in(self, cycles: float) -> float:
-        """The blocks that so many cycles >= 0 are, the last one in part."""
+        """Number of blocks in so many cycles >= 0, the last one in part."""
         ends = np.concatenate([[0.0], np.cumsum(self.cycles)])
         passes, rest = divmod(cycles, float(ends[-1]))
         return passes * self.cycles.size + float(np.interp(rest, ends, np.arange(ends.size)))

@@ -29,8 +29,9 @@ def diagnose(
     without: frozenset[str] = frozenset(),
     isolability: bool = False,
 ) -> Report:
-    """What the baseline gets wrong in this campaign, why, and what an extension gains. The same data, the same verdict:
-    `rng` only makes the error of a gain and the sample of sizes, each from a stream of its own.
+    """The report of a campaign: the baseline's model discrepancy, its likely causes, and the gain of an extended model.
+    The same data, the same verdict: `rng` only makes the error of a gain and the sample of sizes, each from a stream of
+    its own.
 
     Effects whose slugs are in `without` are taken out of the catalogue. `isolability`: also which causes this design could
     tell apart. What data lack is a verdict, `insufficient_data`; an

@@ -37,7 +37,8 @@ _PART = 2000
 
 
 class NotFiniteError(ArithmeticError):
-    """An extension makes no number of some points; the message says which effect, and of how many."""
+    """Raised where an extension's change of torque is not finite at some points; the message says which effect, and of
+    how many."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,13 +74,13 @@ class Extension:
 
     @property
     def law(self) -> LearnedLaw | None:
-        """How friction differs from eq. 3; None where eq. 3 stays."""
+        """The learned discrepancy of friction from eq. 3; None where eq. 3 stays."""
         stored = self.content["law"]
         return None if stored is None else _learned_from(stored)
 
     @property
     def has_course(self) -> bool:
-        """Whether any draw follows an effect of use along the life."""
+        """Whether any draw contains an effect of use along the life."""
         return bool(self.content["courses"]) and any(
             BY_SLUG[effect["slug"]].kind is EffectKind.COURSE
             for draw in self.content["draws"]
@@ -128,12 +129,13 @@ class Extension:
 
     @property
     def severity_exponent(self) -> float | None:
-        """Where load severity was named: ζ grows by (energy/usual energy)^exponent a cycle; else None."""
+        """Exponent of load severity where it was named, ζ growing by (energy/usual energy)^exponent a cycle; else
+        None."""
         exponent = self.content.get("severity_exponent")
         return None if exponent is None else float(exponent)
 
     def to_dict(self) -> dict[str, Any]:
-        """As JSON can carry it."""
+        """The extension as values that JSON can carry."""
         return {"effects": list(self.effects), "content": dict(self.content)}
 
     @classmethod
@@ -195,7 +197,7 @@ def build_extension(
 
 
 def facts_to(facts: Facts | Frame | LawForm) -> dict[str, Any]:
-    """Facts, a frame, or the form of a law, as JSON can carry them: arrays as lists, what is not a number as None."""
+    """Facts, a frame, or the form of a law, as values that JSON can carry: arrays as lists, NaN as None."""
     stored = asdict(facts)
     for name, value in stored.items():
         if isinstance(value, np.ndarray | tuple):
@@ -211,7 +213,7 @@ def facts_from(stored: Mapping[str, Any]) -> Facts:
 
 
 def _arrays_of(kind: type[Facts | Frame | LawForm], stored: Mapping[str, Any]) -> dict[str, Any]:
-    """What is stored with its lists as the arrays, or tuples, that they were."""
+    """Stored fields of a dataclass, with lists converted back to arrays or tuples and None to NaN."""
     values = dict(stored)
     for field in fields(kind):
         if isinstance(value := stored[field.name], list):

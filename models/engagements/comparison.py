@@ -39,7 +39,7 @@ class SpeedCourse:
 
     @property
     def time(self) -> FloatArray:
-        """The steps [s since contact]."""
+        """Times [s since contact] of the steps."""
         return np.linspace(0.0, self.duration.value, self.speed.size)
 
     def at(self, time: FloatArray) -> FloatArray:
@@ -49,7 +49,8 @@ class SpeedCourse:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Comparison:
-    """The three indicators; `spectral_angle` in rad, the others without a unit."""
+    """Three indicators of an engagement's deviation from the reference; `spectral_angle` in rad, the others without a
+    unit."""
 
     normalised_duration: ValueWithError
     euclidean_distance: ValueWithError
@@ -57,7 +58,7 @@ class Comparison:
 
 
 def reference_of(courses: Sequence[SpeedCourse]) -> SpeedCourse:
-    """The reference that courses make. Raises ValueError where there is none."""
+    """The reference course from several engagements' courses. Raises ValueError where there is none."""
     if not courses:
         raise ValueError("a reference needs at least one engagement, got none")
     count = len(courses)
@@ -74,7 +75,8 @@ def reference_of(courses: Sequence[SpeedCourse]) -> SpeedCourse:
 
 
 def compared(course: SpeedCourse, reference: SpeedCourse) -> Comparison:
-    """A course against the reference. Standard errors are of the speed's noise and of the moments of contact and end."""
+    """Comparison of a course with the reference. Standard errors are of the speed's noise and of the moments of contact
+    and end."""
     x, r = course.at(reference.time), reference.speed
     size, measured_size = float(np.linalg.norm(x)), float(np.linalg.norm(r))
     cosine = float(x @ r) / (size * measured_size)
@@ -90,7 +92,7 @@ def compared(course: SpeedCourse, reference: SpeedCourse) -> Comparison:
 
 
 def same_duty(value: float, reference: float) -> bool:
-    """Whether an initial speed or a highest pressure is that of the reference, nearly."""
+    """Whether an initial speed or a highest pressure nearly equals that of the reference."""
     return abs(value - reference) <= 0.1 * abs(reference)  # beyond it an engagement is of another duty
 
 

@@ -41,8 +41,9 @@ class RecordedPressure:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EngagementDiscrepancy:
-    """`trace` is the simulated engagement on the record's clock, `torque_share` [-] the discrepancy of torque;
-    `simulated_stop_time` [s] and `stop_time_difference` [s] are None where the simulated clutch slips on."""
+    """The comparison of a measured engagement with a simulated one: `trace` is the simulated engagement on the record's
+    clock, `torque_share` [-] the discrepancy of torque; `simulated_stop_time` [s] and `stop_time_difference` [s] are
+    None where the simulated clutch slips on."""
 
     trace: Engagement
     drive: Drive
@@ -54,8 +55,8 @@ class EngagementDiscrepancy:
 def discrepancy(
     engagement: EngagementIndicators, capacity: Capacity, mean_radius: float, moments: int = 100
 ) -> EngagementDiscrepancy | None:
-    """A measured engagement against a clutch of this capacity, torques compared at so many moments of the slip; None where
-    the record does not show what slowed the shaft."""
+    """The discrepancy of a measured engagement from a simulated one with this capacity, torques compared at `moments`
+    times of the slip; None where the record shows no deceleration by the clutch."""
     slip = engagement.slip
     drive = _drive_of(slip, engagement.initial_speed.value)
     if drive is None:
@@ -85,7 +86,8 @@ def discrepancy(
 
 
 def _drive_of(slip: SlipRecord, speed: float) -> Drive | None:
-    """The drive of a record; None where the shaft was not slowed by the clutch's torque."""
+    """The drive of a record, with the inertia that its deceleration implies; None where the shaft was not slowed by the
+    clutch's torque."""
     until = slip.time[-1] if slip.again is None else slip.again
     sticking_torque = slip.torque[slip.between(slip.end.value + 2 * slip.end.sd, float(until))]
     limit = max(float(np.median(sticking_torque)), 0.0) if sticking_torque.size >= 3 else 0.0

@@ -32,8 +32,8 @@ from models.records.runs import Record
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EngagementIndicators:
-    """One engagement. Times in s of the record's clock, stop_time s, energy J, peak_power W, speeds rad/s, pressures Pa,
-    all others without a unit; None where the record does not determine it.
+    """Indicators of one engagement. Times in s of the record's clock, stop_time s, energy J, peak_power W, speeds
+    rad/s, pressures Pa, all others without a unit; None where the record does not determine it.
 
     `course` is the slip's speed over time, for comparison with other engagements.
     """
@@ -56,7 +56,7 @@ class EngagementIndicators:
 
 
 def measured_engagement(record: Record, geometry: Geometry) -> EngagementIndicators | Refusal:
-    """The indicators of a record of one engagement, or why it has none."""
+    """The indicators of a record of one engagement, or the reason why it has none."""
     slip = slip_of(record)
     if isinstance(slip, Refusal):
         return slip
@@ -97,7 +97,7 @@ def trace_times(slip: SlipRecord) -> FloatArray:
 
 
 class _Channels:
-    """The channels of a slip, from contact to where it surely has not ended yet."""
+    """The channels of a slip, from contact to a time before its end with certainty."""
 
     def __init__(self, slip: SlipRecord, per_pascal: float) -> None:
         rows = slip.between(slip.contact, slip.end.value - 2 * slip.end.sd)
@@ -123,21 +123,21 @@ class _Channels:
         )
 
     def moment(self, speed: float) -> float:
-        """When the shaft has come down to a speed [rad/s]: the moment that leaves the fewest samples on the wrong side."""
+        """Time [s] at which the shaft passes a speed [rad/s], with the fewest samples on the wrong side."""
         return crossing(self.speed.time, self.speed.values <= speed)
 
     def cof(self, moment: float) -> ValueWithError | None:
-        """μ at a moment of the slip [s]."""
+        """Coefficient of friction μ at a moment of the slip [s]."""
         return None if self.friction is None else self.friction.at(moment, self.width)
 
     def noise(self, channel: SensorChannel) -> float:
-        """The deviation of a sample, by differences of second order."""
+        """Standard deviation of a sample, from second differences."""
         second = np.diff(channel.values, 2)
         return float(np.sqrt(np.mean(second**2) / 6))
 
 
 def _friction(slip: SlipRecord, per_pascal: float, rows: NDArray[np.bool_]) -> SensorChannel | None:
-    """μ of every sample under load; `per_pascal` [Nm/Pa] is the torque of a unit μ."""
+    """Coefficient of friction μ of every sample under load; `per_pascal` [Nm/Pa] is the torque of a unit μ."""
     loaded = rows & (slip.pressure >= UNLOADED)
     if not loaded.any():
         return None
@@ -149,7 +149,8 @@ def _ratio(value: ValueWithError | None, reference: ValueWithError | None) -> Va
 
 
 def _energy(slip: SlipRecord, channels: _Channels) -> ValueWithError:
-    """The trapezoid of power; from contact to the first sample power is that sample's, at the end of slip it is zero."""
+    """Dissipated energy [J] by the trapezoidal rule; from contact to the first sample power is that sample's, at the
+    end of slip it is zero."""
     rows = slip.between(slip.contact, slip.end.value)
     torque, speed = slip.torque[rows], slip.speed[rows]
     steps = np.diff(np.concatenate([[slip.contact], slip.time[rows], [slip.end.value]]))
@@ -174,7 +175,7 @@ def _peak_power(slip: SlipRecord) -> ValueWithError | None:
 
 
 def _breakaway(slip: SlipRecord, channels: _Channels, per_pascal: float) -> ValueWithError | None:
-    """μ at the moment at which slip begins again, by the samples between the standstill and it."""
+    """Coefficient of friction μ at which slip begins again, from the samples between the standstill and that moment."""
     if slip.again is None:
         return None
     sticking = slip.between(slip.end.value, slip.again)
@@ -186,7 +187,7 @@ def _breakaway(slip: SlipRecord, channels: _Channels, per_pascal: float) -> Valu
 
 
 def _course(slip: SlipRecord, channels: _Channels) -> SpeedCourse:
-    """Speed at equal steps from contact to the end of slip, each the mean over one step about it."""
+    """Speed course at equal steps from contact to the end of slip, each speed the mean over one step about it."""
     duration = slip.end.value - slip.contact
     at_once = max(channels.speed.values.size / COURSE_POINTS, 1.0)
     return SpeedCourse(

@@ -38,7 +38,7 @@ from models.records.runs import Record
 
 
 class SlipStatus(StrEnum):
-    """Whether a record holds an engagement, and if not, why."""
+    """Whether a record holds an engagement, and if not, the reason."""
 
     DETERMINED = "determined"
     TOO_FEW_SAMPLES = "too_few_samples"
@@ -54,7 +54,7 @@ class SlipStatus(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Refusal:
-    """Why a record holds no engagement, as a status and a sentence."""
+    """The reason why a record holds no engagement, as a status and a sentence."""
 
     status: SlipStatus
     message: str
@@ -98,8 +98,8 @@ class SensorChannel:
 
 
 def channel_of(time: FloatArray, values: FloatArray, parts: int = 8, most: float = 0.9) -> SensorChannel:
-    """A channel whose noise is that of the residuals of parabolas through equal parts of it; its correlation is taken for
-    `most` at most: with a factor of 19 no window holds samples enough."""
+    """A channel with the autocorrelation of its noise estimated from residuals of parabolas through equal parts of it.
+    The correlation is limited to `most`: with a variance factor of more than 19 no window holds samples enough."""
     before, after = [np.zeros(0)], [np.zeros(0)]
     for at, part in zip(np.array_split(time, parts), np.array_split(values, parts), strict=True):
         if at.size >= FEWEST_LOCAL:
@@ -113,7 +113,8 @@ def channel_of(time: FloatArray, values: FloatArray, parts: int = 8, most: float
 
 
 def _fitted(moment: FloatArray, values: FloatArray, inflation: float) -> ValueWithError:
-    """The value at 0 by a parabola through the samples at `moment` [n], or by a line where that serves."""
+    """The value at 0 of a parabola through the samples at `moment` [n], or of a line where its curvature is not
+    significant."""
     design = np.stack([np.ones_like(moment), moment, moment**2], axis=1)
     estimate, curvature = _least_squares(design, values, inflation)
     if abs(curvature.value) > 2.0 * curvature.sd:
@@ -122,7 +123,7 @@ def _fitted(moment: FloatArray, values: FloatArray, inflation: float) -> ValueWi
 
 
 def _least_squares(design: FloatArray, values: FloatArray, inflation: float) -> tuple[ValueWithError, ValueWithError]:
-    """The first and the last coefficient."""
+    """The first and the last coefficient of a least-squares fit, with standard errors."""
     inverse = np.linalg.pinv(design.T @ design)
     coefficients = inverse @ (design.T @ values)
     residual = values - design @ coefficients
@@ -148,7 +149,8 @@ class Standstill:
 
 
 def standstill_of(time: FloatArray, speed: FloatArray) -> Standstill | Refusal:
-    """How a shaft of time [n] s and speed [n] rad/s comes to rest, the first time that it does; or why it does not."""
+    """The shaft's way to its first rest, from time [n] s and speed [n] rad/s; or the reason why it does not come to
+    rest."""
     smooth = running_median(speed, 5)
     highest = float(smooth.max())
     if highest < criteria.LEAST_SPEED:
@@ -178,7 +180,7 @@ def standstill_of(time: FloatArray, speed: FloatArray) -> Standstill | Refusal:
 
 
 def _rpm(speed: float) -> str:
-    """A speed [rad/s] as it is shown."""
+    """A speed [rad/s] as text."""
     return f"{30.0 * speed / math.pi:.3g} rpm"
 
 
@@ -270,7 +272,7 @@ class SlipRecord:
         return ValueWithError(value=self.end.value - self.start.value, sd=math.hypot(self.start.sd, self.end.sd))
 
     def between(self, low: float, high: float) -> NDArray[np.bool_]:
-        """Which samples [n] lie from `low` to `high` [s], both included."""
+        """Mask [n] of the samples from `low` to `high` [s], both included."""
         return (self.time >= low) & (self.time <= high)
 
 
@@ -354,7 +356,7 @@ class _Contact:
 
 
 def _contact_of(time: FloatArray, torque: FloatArray, slowing: int) -> _Contact | Refusal:
-    """Fit the contact to the rows before the end of slip; the shaft is fast up to row `slowing`."""
+    """The contact, fitted to the rows before the end of slip, or a refusal; the shaft is fast up to row `slowing`."""
     from scipy.ndimage import uniform_filter1d  # start-up time: what answers cuts no record
 
     smooth = uniform_filter1d(torque, max(3, (time.size - slowing) // 100), mode="nearest")
@@ -390,7 +392,8 @@ def _crossings(time: FloatArray, torque: FloatArray, highest: float) -> tuple[fl
 
 
 def crossing(time: FloatArray, above: NDArray[np.bool_]) -> float:
-    """The moment that leaves the fewest samples [n] above a level before it and below it after."""
+    """Time [s] at which a level is crossed: the one with the fewest samples `above` [n] the level before it and below
+    it after."""
     wrong = np.concatenate([[0], np.cumsum(above)]) + np.concatenate([np.cumsum(~above[::-1])[::-1], [0]])
     row = int(np.argmin(wrong))
     return float(time[max(row - 1, 0)] + time[min(row, time.size - 1)]) / 2

@@ -67,7 +67,8 @@ _ROUNDING = 1e-14
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FitNoise:
-    """sd [P] of a point of weight 1, widening [P]: Student's over the normal quantile, inflated [P], assumed [P].
+    """Noise of P curves: standard deviation sd [P] of a point of weight 1, widening [P]: Student's over the normal
+    quantile, inflated [P], assumed [P].
 
     shaped [P]: part of the noise is taken to go with the torque, because deviations of the points were not given.
     """
@@ -104,8 +105,8 @@ def estimate_noise(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Uncertainty:
-    """covariance [P, 4, 4] of (M_s, M̄_c, V_S, C_v), all but M̄_c scaled, as wide as the interval of one test needs it, and
-    without that bias; undetermined [P, 4]."""
+    """Covariance [P, 4, 4] of (M_s, M̄_c, V_S, C_v), all but M̄_c scaled, as wide as the interval of one test needs it,
+    and without that bias; undetermined [P, 4]."""
 
     covariance: FloatArray
     unbiased_covariance: FloatArray
@@ -163,8 +164,8 @@ def _covariance(
 def _shapes(
     problem: ProjectionProblem, columns: FloatArray, optimum: VelocityProfile, noise: FitNoise
 ) -> tuple[FloatArray, FloatArray]:
-    """Variance of each point [P, n] over `noise.sd`²: its own r²/(1 - h)², and r²/(1 - h); both 1 where the deviations are
-    given, the first wider where they were raised.
+    """Relative variances [P, n] of the points, over `noise.sd`²: r²/(1 - h)² (HC3), and r²/(1 - h) (HC2); both 1 where
+    the deviations are given, the first wider where they were raised.
 
     A point that the fit passes through has no residual of its own: in the first its 1 - h and its variance are taken as no
     less than some, in the second it has the variance of the others."""
@@ -179,7 +180,8 @@ def _shapes(
 
 
 def _leverage(columns: FloatArray) -> FloatArray:
-    """h [P, n], the diagonal of J (JᵀJ)⁻¹ Jᵀ for columns J [P, n, 4]; what is rounding of JᵀJ has none."""
+    """Leverage h [P, n], the diagonal of J (JᵀJ)⁻¹ Jᵀ for columns J [P, n, 4]; directions whose eigenvalue of JᵀJ is
+    rounding are left out."""
     values, vectors = np.linalg.eigh(columns.swapaxes(1, 2) @ columns)
     sound = values > _ROUNDING * values[:, -1:]
     scale = np.where(sound, 1.0 / np.sqrt(np.where(sound, values, 1.0)), 0.0)
@@ -202,14 +204,15 @@ def _sandwich(columns: FloatArray, relative_variance: FloatArray, sd: FloatArray
 
 
 def _stray(optimum: VelocityProfile, scan: VelocityProfile, noise: FitNoise) -> FloatArray:
-    """How far [P] from the optimum, in log V_S, the profile still lies within the 90 % likelihood interval."""
+    """Largest distance [P] in log V_S from the optimum at which the profile lies within the 90 % likelihood
+    interval."""
     limit = optimum.residual + (criteria.Z90 * noise.widening * noise.sd)[:, None] ** 2
     distance = np.abs(scan.log_velocity - optimum.log_velocity)
     return np.asarray(np.where(scan.residual <= limit, distance, 0.0).max(axis=1))
 
 
 def _transform(problem: ProjectionProblem, optimum: VelocityProfile) -> FloatArray:
-    """∂(M_s, M̄_c, V_S, C_v)/∂(a, b e_max, c, log V_S) [P, 4, 4]."""
+    """Jacobian ∂(M_s, M̄_c, V_S, C_v)/∂(a, b e_max, c, log V_S) [P, 4, 4]."""
     a, b = optimum.coefficients[:, 0, :2].T
     v_s = np.exp(optimum.log_velocity[:, 0])
     peak = v_s * problem.fastest
@@ -255,7 +258,8 @@ class StribeckFit:
 
     @property
     def standard_errors(self) -> FloatArray:
-        """[4] in the order of PARAMETER_NAMES; estimate ± 1.645 of it holds the truth in 90 % of tests."""
+        """Standard errors [4] in the order of PARAMETER_NAMES; estimate ± 1.645 of them holds the truth in 90 % of
+        tests."""
         return np.sqrt(np.diag(self.covariance))
 
 
@@ -297,8 +301,8 @@ def fit_curves(curves: Sequence[Curve], at_once: int = 20_000) -> tuple[Stribeck
 
 
 def mean_torques(fits: Sequence[StribeckFit], velocities: FloatArray, raised: FloatArray | float = 1.0) -> FloatArray:
-    """Means of the fitted curves over velocities [m] m/s, and their standard deviations by the delta method [Nm]; [n, 2].
-    `raised` [n, m] is what friction is there of eq. 3 [-]."""
+    """Means of the fitted curves over velocities [m] m/s, and their standard deviations by the delta method [Nm];
+    [n, 2]. `raised` [n, m] is the ratio of friction to eq. 3 [-]."""
     stacked = np.stack([fit.parameters.as_array() for fit in fits], axis=1)[:, :, None]
     parameters = StribeckParameters.from_array(stacked)
     factor = np.broadcast_to(raised, (len(fits), velocities.size))
@@ -361,7 +365,8 @@ def _fit_batch(folded: Sequence[_Folded]) -> list[StribeckFit]:
 
 
 def _constant(problem: ProjectionProblem, optimum: VelocityProfile, single: NDArray[np.bool_]) -> VelocityProfile:
-    """At a single speed four parameters fit a mean: M_s is that mean, M̄_c = 1, V_S that speed, C_v = 0."""
+    """The optimum at a single speed, where four parameters fit a mean: M_s is that mean, M̄_c = 1, V_S that speed,
+    C_v = 0."""
     if not single.any():
         return optimum
     mean = (problem.torque * problem.weight).sum(axis=1) / (problem.weight**2).sum(axis=1)
@@ -378,7 +383,7 @@ def _constant(problem: ProjectionProblem, optimum: VelocityProfile, single: NDAr
 
 
 def _at_bound(optimum: VelocityProfile, level: FloatArray) -> tuple[VelocityProfile, NDArray[np.bool_]]:
-    """The optimum with M_s lifted off zero, and which of M_s, M̄_c, C_v are zero [P, 3]."""
+    """The optimum with M_s lifted off zero, and whether each of M_s, M̄_c, C_v is zero [P, 3]."""
     coefficients = optimum.coefficients[:, 0]
     least = 1e-6 * level  # M̄_c = b/M_s must exist where the optimum has M_s = 0
     bound = coefficients <= np.stack([least, 0 * least, 0 * least], axis=1)
@@ -453,7 +458,8 @@ def _within_noise(folded: _Folded, miss: FloatArray) -> bool:
 
 
 def _undetermined(folded: _Folded, too_wide: NDArray[np.bool_]) -> tuple[str, ...]:
-    """Names by the width of their uncertainty; with fewer than four speeds all, except M_s where it was measured at rest."""
+    """Names of the undetermined parameters, by the width of their uncertainty; with fewer than four speeds all, except
+    M_s where it was measured at rest."""
     too_few = folded.distinct < len(PARAMETER_NAMES)
     seen_at_rest = bool((folded.speed == 0).any())
     return tuple(
@@ -466,7 +472,7 @@ def _undetermined(folded: _Folded, too_wide: NDArray[np.bool_]) -> tuple[str, ..
 def _message(
     folded: _Folded, undetermined: tuple[str, ...], at_zero: tuple[str, ...], noise: FitNoise, row: int
 ) -> str:
-    """A sentence or two for a person."""
+    """A sentence or two on the fit's status for a person."""
     parts, names = [], ", ".join(undetermined)
     if undetermined and folded.distinct < len(PARAMETER_NAMES):
         parts.append(f"Too few different speeds ({folded.distinct}) to determine {names}: test more speeds.")

@@ -13,8 +13,8 @@ from models.arrays import FloatArray
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MeasuredCurve:
-    """Points of one pressure level, folded to v >= 0: velocity [n] m/s, ascending, torque [n] Nm and how many rows each is
-    the mean of, count [n]; `noise` [Nm], the deviation of a row."""
+    """A measured friction curve of one pressure level, folded to v >= 0: velocity [n] m/s, ascending, torque [n] Nm and
+    the number of rows averaged in each, count [n]; `noise` [Nm], the deviation of a row."""
 
     velocity: FloatArray
     torque: FloatArray
@@ -46,8 +46,8 @@ class MeasuredCurve:
         return cls(velocity=columns[0], torque=columns[1], count=columns[2], noise=noise)
 
     def mean(self, velocities: FloatArray, raised: FloatArray | float = 1.0) -> tuple[float, float]:
-        """Mean torque over velocities [m] m/s and its deviation [Nm], between points on straight lines and beyond the ends
-        as at the ends; `raised` [m] is what friction is there of these points' [-].
+        """Mean torque over velocities [m] m/s and its standard deviation [Nm], by linear interpolation between points
+        and constant beyond the ends; `raised` [m] is the ratio of friction to these points' [-].
 
         The mean is Σ w_i T_i. Its variance is Σ w_i² noise²/count_i; where a share of the velocities lies beyond the ends,
         that share of the points' range is added to the deviation, for nothing was measured there."""

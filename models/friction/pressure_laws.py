@@ -23,13 +23,13 @@ from models.friction.stribeck import PARAMETER_NAMES, StribeckParameters
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LinearPressureLaw:
-    """α + β p: `intercept` in the parameter's unit, `slope` in that unit per Pa."""
+    """A linear law α + β p: `intercept` in the parameter's unit, `slope` in that unit per Pa."""
 
     intercept: float
     slope: float
 
     def __call__(self, pressure: FloatArray) -> FloatArray:
-        """At pressure [...] Pa."""
+        """The parameter at pressure [...] Pa."""
         return self.intercept + self.slope * pressure
 
     def gradient(self, pressure: FloatArray) -> FloatArray:
@@ -39,18 +39,20 @@ class LinearPressureLaw:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AsymptoticPressureLaw:
-    """c_∞ + a e^{-p/p_0}: `asymptote` and `excess` in the parameter's unit, `decay` p_0 in Pa."""
+    """A law that falls to an asymptote, c_∞ + a e^{-p/p_0}: `asymptote` and `excess` in the parameter's unit, `decay`
+    p_0 in Pa."""
 
     asymptote: float
     excess: float
     decay: float
 
     def __call__(self, pressure: FloatArray) -> FloatArray:
-        """At pressure [...] Pa."""
+        """The parameter at pressure [...] Pa."""
         return self.asymptote + self.excess * np.exp(-pressure / self.decay)
 
     def gradient(self, pressure: FloatArray) -> FloatArray:
-        """Derivatives by (asymptote, excess, decay) [n, 3] at pressure [n] Pa; 0 by what is held at its bound of 0."""
+        """Derivatives by (asymptote, excess, decay) [n, 3] at pressure [n] Pa; 0 for a coefficient at its bound of
+        0."""
         falling = np.exp(-pressure / self.decay)
         by_asymptote = np.ones_like(pressure) if self.asymptote > 0.0 else np.zeros_like(pressure)
         by_excess = falling if self.excess > 0.0 else np.zeros_like(pressure)

@@ -62,7 +62,7 @@ class StribeckParameters:
 
 
 def _decay(velocity: FloatArray, stribeck_velocity: float | FloatArray) -> tuple[FloatArray, FloatArray]:
-    """|v| [n] with standstill lifted off zero, and e = exp(-V_S/|v|) [n], 0 at standstill even where V_S is 0."""
+    """Speed |v| [n] with standstill lifted off zero, and e = exp(-V_S/|v|) [n], 0 at standstill even where V_S is 0."""
     speed = np.abs(velocity)
     moving = speed > STANDSTILL
     safe = np.where(moving, speed, 1.0)
@@ -83,7 +83,7 @@ def torque(velocity: FloatArray, parameters: StribeckParameters) -> FloatArray:
 
 
 def gradient(velocity: FloatArray, parameters: StribeckParameters) -> FloatArray:
-    """∂S/∂(M_s, M̄_c, V_S, C_v) [n, 4] at velocity [n] m/s, columns in the order of PARAMETER_NAMES.
+    """Derivatives ∂S/∂(M_s, M̄_c, V_S, C_v) [n, 4] at velocity [n] m/s, columns in the order of PARAMETER_NAMES.
 
     sign(v) [(1 - e) + M̄_c e,   M_s e,   -M_s (M̄_c - 1) e/|v|,   |v|^γ]
     """
@@ -95,7 +95,7 @@ def gradient(velocity: FloatArray, parameters: StribeckParameters) -> FloatArray
 
 
 def slope(velocity: FloatArray, parameters: StribeckParameters) -> FloatArray:
-    """dS/dv [Nm s/m] at velocity [n] m/s, even in v: M_s (M̄_c - 1) e V_S/v² + γ C_v |v|^(γ-1).
+    """Slope dS/dv [Nm s/m] at velocity [n] m/s, even in v: M_s (M̄_c - 1) e V_S/v² + γ C_v |v|^(γ-1).
 
     Negative slope is what makes a driveline shudder. At v = ±0 the viscous term has no finite slope: inf where C_v > 0,
     and 0 where C_v = 0 (e vanishes faster than any power of v).

@@ -83,7 +83,8 @@ class VelocityProfile:
 
 
 def make_problem(speed: FloatArray, torque: FloatArray, weight: FloatArray) -> ProjectionProblem:
-    """Prepare P curves: speed [P, n] >= 0 as a share of the highest, torque [P, n], weight [P, n] (0: padding)."""
+    """The scaled and padded problem of P curves: speed [P, n] >= 0 as a share of the highest, torque [P, n], weight
+    [P, n] (0: padding)."""
     moving = (weight > 0) & (speed > 0)
     fast = speed.max(axis=1, where=moving, initial=0.0)
     still = fast == 0
@@ -133,7 +134,7 @@ def _decay(problem: ProjectionProblem, log_velocity: FloatArray) -> tuple[FloatA
 
 
 def profile(problem: ProjectionProblem, log_velocity: FloatArray) -> VelocityProfile:
-    """Non-negative least squares in a, b, c at log V_S [P, K], all eight sets of columns compared."""
+    """Non-negative least squares in a, b, c at log V_S [P, K], by comparison of all eight sets of columns."""
     z, peak, linear = _decay(problem, log_velocity)
     coefficients, residual, valid = _three_columns(problem, z, peak)
     negative = ~valid
@@ -253,12 +254,13 @@ def _bracket(
 
 
 def _tolerance(problem: ProjectionProblem) -> FloatArray:
-    """Residuals within this of each other [P] are equal: V_S does not matter there."""
+    """Tolerance [P] within which residuals count as equal: V_S does not matter there."""
     return np.asarray(1e-13 * (problem.torque**2).sum(axis=1))
 
 
 def _tie(problem: ProjectionProblem, scan: VelocityProfile, lowest: FloatArray) -> FloatArray:
-    """Of the scanned log V_S that tie with the lowest residual [P] that nearest to the middle of the speeds, [P, 1].
+    """The scanned log V_S [P, 1] nearest to the middle of the speeds, among those within the tolerance of the lowest
+    residual [P].
 
     Where none ties (V_S matters), the middle itself.
     """

@@ -57,7 +57,8 @@ class LagStatus(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StationaryCurve:
-    """The curve that torque lags behind, and the covariance [4, 4] of its parameters; zero where it is exact."""
+    """The stationary curve that torque lags behind, and the covariance [4, 4] of its parameters; zero where it is
+    exact."""
 
     parameters: StribeckParameters
     covariance: FloatArray = field(default_factory=lambda: np.zeros((4, 4)))
@@ -68,8 +69,8 @@ class StationaryCurve:
 
     @classmethod
     def of(cls, fit: StribeckFit) -> "StationaryCurve":
-        """A fitted curve, with its unbiased covariance: lags are tracked along a life, and one loop's interval has the noise
-        of the record beside it."""
+        """The stationary curve of a fit, with its unbiased covariance: lags are tracked along a life, and one loop's
+        interval has the noise of the record beside it."""
         return cls(parameters=fit.parameters, covariance=fit.unbiased_covariance)
 
 
@@ -102,8 +103,8 @@ SQUEEZE_FILM = Law(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LagFit:
-    """u of one law: lag > 0 or None, its deviation, the 90 % interval (its ends may be <= 0 or infinite), log_likelihood up
-    to a constant that laws on one record share."""
+    """The fitted lag u of one law: lag > 0 or None, its deviation, the 90 % interval (its ends may be <= 0 or
+    infinite), log_likelihood up to a constant that laws on one record share."""
 
     lag: float | None
     lag_sd: float
@@ -149,7 +150,7 @@ def fit_lag(
 
 @dataclass(frozen=True, slots=True)
 class _Estimate:
-    """u, its deviation by the record's noise, and by the curve's error."""
+    """An estimate of the lag u, with its standard deviations from the record's noise and from the curve's error."""
 
     lag: float
     noise: float
@@ -160,7 +161,7 @@ class _Estimate:
         return math.hypot(self.noise, self.slant)
 
     def interval(self) -> tuple[float, float]:
-        """Fieller's, 90 %; an end that is not bounded is infinite."""
+        """Fieller's 90 % interval; an end that is not bounded is infinite."""
         spare = 1 - (Z90 * self.slant / self.lag) ** 2 if self.lag else 1.0
         clear = self.lag**2 - (Z90 * self.noise) ** 2
         if spare > 0:
@@ -174,7 +175,8 @@ class _Estimate:
 
 
 def _by_curve(estimate: Callable[[StribeckParameters], float], curve: StationaryCurve) -> float:
-    """The deviation of an estimate that the curve's covariance makes, by forward differences: bounds at 0 do not matter."""
+    """Standard deviation of an estimate due to the curve's covariance, by forward differences: bounds at 0 do not
+    matter."""
     deviation = np.sqrt(np.maximum(np.diag(curve.covariance), 0.0))
     if not deviation.any():
         return 0.0
@@ -190,7 +192,7 @@ def _by_curve(estimate: Callable[[StribeckParameters], float], curve: Stationary
 
 
 def _erring(courses: Sequence[FloatArray], curve: StationaryCurve) -> FloatArray:
-    """How the torque [k, n] Nm changes with the curve's parameters, in k independent directions of a deviation each.
+    """Changes of torque [k, n] Nm by one standard deviation of the curve's parameters, in k independent directions.
 
     `courses` are the torque at the curve, and with each uncertain parameter moved by _MOVED of its deviation.
     """
@@ -203,7 +205,7 @@ def _erring(courses: Sequence[FloatArray], curve: StationaryCurve) -> FloatArray
 
 
 class _Posed:
-    """A law and a curve put to the samples of a record that slide: phase, speed, torque [n].
+    """The fitting problem of a law and a curve to the sliding samples of a record: phase, speed, torque [n].
 
     `absorbed` [n, s] spans zero and shapes, orthonormal; `left` is the torque without it. The law's torque is computed in
     its periodic state, over a grid of phases.
@@ -239,7 +241,7 @@ class _Posed:
         self._velocity = np.maximum(cycle.value(grid), 0.0)
 
     def at(self, lags: FloatArray) -> FloatArray:
-        """The torque [k, n] Nm at lags [k]."""
+        """Predicted torque [k, n] Nm at lags [k]."""
         courses = self.law.respond(self._time, self._velocity, self.curve, lags[:, np.newaxis])[:, self._start :]
         position = np.mod(self.phase, 2 * math.pi) * (self._steps / (2 * math.pi))
         cell = np.minimum(position.astype(np.int64), self._steps - 1)
@@ -247,7 +249,7 @@ class _Posed:
         return np.asarray(courses[:, cell] * (1 - part) + courses[:, cell + 1] * part, dtype=np.float64)
 
     def about(self, lag: float) -> tuple[FloatArray, FloatArray]:
-        """The torque [n] Nm at a lag, and how it changes with it."""
+        """Predicted torque [n] Nm at a lag, and its derivative by the lag."""
         step = 1e-3 * lag
         low, middle, high = self.at(np.array([lag - step, lag, lag + step]))
         return middle, (high - low) / (2 * step)
@@ -266,8 +268,8 @@ class _Posed:
         return float(np.square(self.left - gain * left).sum() + ((gain - 1) * self.noise / GAIN_SD) ** 2)
 
     def near_none(self, little: FloatArray | None = None) -> tuple[float, float]:
-        """Deviation and estimate of the lag, linearised about none, which gives its sign; `little` [n] Nm is the torque at
-        the least lag."""
+        """Standard deviation and estimate of the lag, signed, from the model linearised about no lag; `little` [n] Nm
+        is the torque at the least lag."""
         least = self.law.lags[:1]
         still = torque(self.speed, self.curve)
         little = self.at(least)[0] if little is None else little
@@ -280,7 +282,8 @@ class _Posed:
         return self._deviation(residual - estimate * orthogonal) / math.sqrt(strength), estimate
 
     def stepped(self, lag: float) -> tuple[float, FloatArray]:
-        """The lag one Gauss-Newton step on, over its gain where the law is scaled, and the torque [n] Nm before it."""
+        """The lag after one Gauss-Newton step, over its gain where the law is scaled, and the torque [n] Nm before the
+        step."""
         course, change = self.about(lag)
         base, slope = self.without(course), self.without(change)
         gain = self.gain(base)
@@ -290,7 +293,8 @@ class _Posed:
         return after / self.gain(base + move * slope) if self.law.scaled else after, course
 
     def refined(self, misfits: list[float], best: int) -> float:
-        """The minimum about the best of the scan, in log u: three finer scans, each a ninth of the last, and a parabola."""
+        """The lag of least misfit about the best of the scan, in log u: by three finer scans, each a ninth of the last,
+        and a parabola."""
         lags = self.law.lags
         low = math.log(lags[max(best - 1, 0)])
         high = math.log(lags[min(best + 1, lags.size - 1)])
@@ -311,7 +315,7 @@ class _Posed:
         return math.exp(optimum)
 
     def deviation(self, lag: float, course: FloatArray, change: FloatArray, erring: FloatArray) -> tuple[float, float]:
-        """Deviation of u at the optimum (of gain x u/gain where the law is scaled), and the gain there.
+        """Standard deviation of u at the optimum (of gain x u/gain where the law is scaled), and the gain there.
 
         `erring` [k, n] Nm is how the torque changes where the curve errs by a deviation, in independent directions: what
         that explains of the residual is no noise.
@@ -332,7 +336,7 @@ class _Posed:
         return math.hypot(math.sqrt(along_variance), self._by_phase(slope, course, gain)), gain
 
     def _by_phase(self, slope: FloatArray, course: FloatArray, gain: float) -> float:
-        """The part of the speed's own noise: an error of the phase opens a curve into a loop."""
+        """Standard deviation of u due to the speed's own noise: an error of the phase opens a curve into a loop."""
         order = np.argsort(np.mod(self.phase, 2 * math.pi))
         turned = np.empty_like(course)
         distinct = np.mod(self.phase[order], 2 * math.pi) + 1e-9 * np.arange(order.size)
@@ -345,7 +349,8 @@ class _Posed:
         return abs(shift) * math.sqrt(max(float(lead @ cycle.covariance @ lead), 0.0))
 
     def _deviation(self, residual: FloatArray, taken: float = 0.0, blocks: int = 24) -> float:
-        """Of a sample; raised where the means over blocks of phase scatter more than white noise would make them.
+        """Standard deviation of a sample; raised where the means over blocks of phase scatter more than white noise
+        would make them.
 
         `taken` degrees of freedom were taken out of the residual beside what is absorbed.
         """
@@ -375,7 +380,8 @@ class _Posed:
 
 
 def absorbed_beside(speed: FloatArray, curve: StribeckParameters, count: int = 6) -> FloatArray:
-    """Orthonormal columns [n, s]: 1, and so many single-valued shapes over speed [n] without their part along the curve."""
+    """Orthonormal basis [n, s] of a constant and `count` single-valued shapes over speed [n], without their part along
+    the curve."""
     span = max(float(speed.max()) - float(speed.min()), 1e-12)
     shapes = np.polynomial.chebyshev.chebvander(2 * (speed - speed.min()) / span - 1, count + 1)
     frame, _ = np.linalg.qr(np.column_stack([np.ones_like(speed), torque(speed, curve)]))

@@ -49,7 +49,7 @@ def attractor_torque(
     attractor: float | FloatArray,
     start: float | FloatArray | None = None,
 ) -> FloatArray:
-    """M [n] Nm by the attractor law at time [n] s (ascending) and velocity [n] m/s; attractor C > 0 [Nm/s].
+    """Torque M [n] Nm by the attractor law at time [n] s (ascending) and velocity [n] m/s; attractor C > 0 [Nm/s].
 
     An array of attractors [k, 1] gives [k, n]. `start` is M at time[0], S(v) if not given. Between samples S is taken
     as linear in ∫ C/|S| dt: stable however stiff, exact for constant S, and of second order in the time step.
@@ -69,7 +69,8 @@ def attractor_torque(
 def squeeze_film_torque(
     time: FloatArray, velocity: FloatArray, parameters: StribeckParameters, film_time: float | FloatArray
 ) -> FloatArray:
-    """M [n] Nm by the squeezed film at time [n] s (ascending) and velocity [n] m/s; film_time τ_1 > 0 [s] at w = 1 m/s.
+    """Torque M [n] Nm by the squeezed film at time [n] s (ascending) and velocity [n] m/s; film_time τ_1 > 0 [s] at
+    w = 1 m/s.
 
     An array of film times [k, 1] gives [k, n]; w at time[0] is |v|. Raises ValueError on τ_1 <= 0 or times that fall.
     """
@@ -80,7 +81,7 @@ def squeeze_film_torque(
 
 
 def film_speed(time: FloatArray, velocity: FloatArray, film_time: float | FloatArray) -> FloatArray:
-    """w [n] m/s, the speed whose stationary film is the present one, at time [n] s and velocity [n] m/s.
+    """Film speed w [n] m/s, the speed whose stationary film is the present one, at time [n] s and velocity [n] m/s.
 
     In z = w^-0.4 the film's equation is ż = (0.4/τ_1)(z^-2.5 - |v|), convex in z: Newton's iteration on whole courses
     climbs to the solution from wherever it starts, and each step is one linear lag.

@@ -40,7 +40,7 @@ class Direction(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Area:
-    """Eq. 8 [Nm m/s] of a period and its deviation."""
+    """The signed area of a loop by eq. 8 [Nm m/s], over a period, and its standard deviation."""
 
     area: float
     area_sd: float
@@ -78,7 +78,7 @@ def clean_samples(cycle: Cycle, time: FloatArray, torque: FloatArray) -> Samples
 
 
 def area_of(cycle: Cycle, samples: Samples) -> Area:
-    """Eq. 8 over the whole periods of a cycle of sliding velocity in m/s.
+    """Signed area of a loop by eq. 8, over the whole periods of a cycle of sliding velocity in m/s.
 
     The deviation is of the residual noise of torque and speed, and of the scatter from period to period where there are
     three or more and that is larger. Raises ValueError where there are fewer samples than FEWEST_SAMPLES.
@@ -99,14 +99,14 @@ def area_of(cycle: Cycle, samples: Samples) -> Area:
 
 
 def _harmonics_for(phase: FloatArray) -> int:
-    """As many as a third of a period's samples and its widest gap allow."""
+    """Number of harmonics to fit, as many as a third of a period's samples and its widest gap allow."""
     turn = np.sort(np.mod(phase, 2 * math.pi))
     gap = max(float(np.diff(turn).max(initial=0.0)), float(turn[0] + 2 * math.pi - turn[-1]))
     return max(2, min(16, phase.size // 6, int(0.8 * math.pi / gap)))
 
 
 def _design(cycle: Cycle, phase: FloatArray, count: int) -> FloatArray:
-    """1, `count` harmonics, the cusp where the speed comes near zero, a drift where periods repeat."""
+    """Design matrix: 1, `count` harmonics, the cusp where the speed comes near zero, a drift where periods repeat."""
     columns = [np.ones((phase.size, 1)), harmonics(phase, count)]
     turn = np.linspace(0.0, 2 * math.pi, 361)
     lowest = float(np.abs(cycle.value(turn)).min())
@@ -127,7 +127,8 @@ def _solve(design: FloatArray, measured: FloatArray, keep: NDArray[np.bool_]) ->
 
 
 def _area_gradients(cycle: Cycle, solution: FloatArray, count: int) -> tuple[FloatArray, FloatArray]:
-    """∂A/∂(torque's coefficients), and ∂A/∂(the speed's cosines and sines) with the torque's course held."""
+    """Derivatives ∂A/∂(torque's coefficients), and ∂A/∂(the speed's cosines and sines) with the torque's course
+    held."""
     used = min(count, cycle.cosine.size)
     weight = math.pi * np.arange(1, used + 1)
     along, by_speed = np.zeros(solution.size), np.zeros(2 * cycle.cosine.size)
@@ -140,7 +141,7 @@ def _area_gradients(cycle: Cycle, solution: FloatArray, count: int) -> tuple[Flo
 
 
 def _noise(cycle: Cycle, residual: FloatArray, parameters: int) -> float:
-    """Deviation of a sample, raised where block means scatter more than white noise would make them."""
+    """Standard deviation of a sample, raised where block means scatter more than white noise would make them."""
     variance = float(residual @ residual) / max(residual.size - parameters, 1)
     blocks = min(64, residual.size // cycle.periods // 4) * cycle.periods
     freedom = blocks * (1 - parameters / max(residual.size, 1)) - parameters

@@ -26,7 +26,7 @@ from models.records.runs import Record
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FrictionLoop:
-    """One pressure of a dynamic test; `pressure` [Pa] names the level.
+    """The friction loop at one pressure of a dynamic test; `pressure` [Pa] names the level.
 
     frequency [Hz], periods, area and area_sd [Nm m/s] are None, 0, None and None where there is no whole period. attractor
     C [Nm/s] and film_time τ_1 [s] with their deviations are None where the record does not determine them; `better_law` is
@@ -115,7 +115,8 @@ def _loop(
 def _lags(
     cycle: Cycle, samples: Samples, curve: StationaryCurve | None
 ) -> tuple[LagStatus, tuple[LagFit, LagFit] | None]:
-    """The fits of both laws of lag to a loop, or why there are none. With fits, the status is the attractor's."""
+    """The fits of both laws of lag to a loop, or the status that explains why there are none. With fits, the status is
+    the attractor's."""
     speed_over_a_swing = cycle.value(np.linspace(0.0, 2 * np.pi, 361))
     # where the stationary curve falls below 1 % of the loop's largest torque, lag has no meaning
     least = 0.01 * float(np.abs(samples.torque).max())
@@ -129,7 +130,7 @@ def _lags(
 
 
 def _better(attractor: LagFit, film: LagFit, telling: float = 5.0) -> str | None:
-    """The law whose log likelihood is higher by so much at least."""
+    """The law of higher log likelihood, if the difference is at least `telling` nats."""
     lead = attractor.log_likelihood - film.log_likelihood
     if abs(lead) < telling:
         return None

@@ -46,9 +46,10 @@ RESTART, ROLL_OVER, OFFSET, UNIT, STUCK, TWO_CLUTCHES = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CommonCause:
-    """A cause, the log of its prior odds, and the indices of the runs that it concerns, by their dates, with the cycles that
-    each was made at (of another clutch's those sent). `number` is what the cause is about: b, M or f; `reached` the cycles
-    of the runs before it; `log_odds` those against all runs as they were sent, slips of single ones among them."""
+    """A common cause of many wrong runs, the log of its prior odds, and the indices of the runs that it concerns, by
+    their dates, with the cycles that each was made at (of another clutch's those sent). `number` is the cause's
+    parameter: b, M or f; `reached` the cycles of the runs before it; `log_odds` those against all runs as they were
+    sent, slips of single ones among them."""
 
     name: str
     log_prior: float
@@ -95,7 +96,7 @@ def _by_date(runs: Sequence[Run]) -> list[_Dated]:
 
 
 def _near(dated: Sequence[_Dated], found: Sequence[CommonCause]) -> list[int]:
-    """The runs that all hypotheses are weighed by: those dated about the first of each, as many as can be looked at."""
+    """The runs by which all hypotheses are weighed: runs dated about the first of each hypothesis, up to a limit."""
     place = {run.index: k for k, run in enumerate(dated)}
     firsts = [place[cause.runs[0]] for cause in found]
     low, high = max(min(firsts) - criteria.LOOKED_BACK, 0), max(firsts) + criteria.LOOKED_BACK
@@ -126,7 +127,8 @@ def _ordered(runs: Sequence[Run]) -> list[Run]:
 
 
 def _steps(dated: Sequence[_Dated]) -> Iterator[tuple[int, float]]:
-    """The place of each run that was made further on than all before it, and the log of its cycles a second since."""
+    """Index of each run made at more cycles than all runs before it by date, and the log rate [ln cycles/s] since the
+    last such run."""
     furthest = 0
     for k in range(1, len(dated)):
         cycles, seconds = dated[k].start - dated[furthest].start, dated[k].moment - dated[furthest].moment
@@ -137,7 +139,7 @@ def _steps(dated: Sequence[_Dated]) -> Iterator[tuple[int, float]]:
 
 
 def _excess(dated: Sequence[_Dated]) -> Iterator[tuple[int, float]]:
-    """The place of each step, and how many deviations it is faster than those before it."""
+    """Index of each step of `_steps`, and its log rate's excess over the earlier steps' in standard deviations."""
     rates: list[float] = []
     for k, rate in _steps(dated):
         if len(rates) >= criteria.FEWEST_RATES:
@@ -153,7 +155,7 @@ def _log_pace(dated: Sequence[_Dated]) -> float:
 
 
 def _usual_rate(dated: Sequence[_Dated]) -> float | None:
-    """Cycles a second from run to run; None where no two were made apart."""
+    """Median rate [cycles/s] from run to run; None where no two were made apart."""
     rates = [rate for _, rate in _steps(dated)]
     return math.exp(float(np.median(rates))) if rates else None
 
@@ -173,7 +175,7 @@ def _hypotheses(dated: Sequence[_Dated]) -> Iterator[CommonCause]:
 
 
 def _from_here_on(dated: Sequence[_Dated], k: int) -> Iterator[CommonCause]:
-    """The counter changes before the k-th run by date."""
+    """Hypotheses of a counter that changes before the k-th run by date."""
     before, after = dated[:k], dated[k:]
     reached, first = max(run.end for run in before), after[0]
     rate = _usual_rate(before)
@@ -204,7 +206,7 @@ def _from_here_on(dated: Sequence[_Dated], k: int) -> Iterator[CommonCause]:
 
 
 def _counted(name: str, number: float, after: Sequence[_Dated]) -> Iterator[float]:
-    """The cycles that runs were made at after a change of the counter."""
+    """True cycles of the runs after a change of the counter."""
     turns, before = 1, -math.inf
     for run in after:
         if name == UNIT:
@@ -216,7 +218,7 @@ def _counted(name: str, number: float, after: Sequence[_Dated]) -> Iterator[floa
 
 
 def _standing(dated: Sequence[_Dated]) -> Iterator[CommonCause]:
-    """The counter stands still between tests at the same cycles."""
+    """Hypotheses of a counter that stands still between tests at the same cycles."""
     dated = [run for run in dated if run.is_test]
     for _, group in itertools.groupby(enumerate(dated), key=lambda placed: placed[1].end):
         alike = list(group)
@@ -245,7 +247,8 @@ def _standing(dated: Sequence[_Dated]) -> Iterator[CommonCause]:
 
 
 def _other_clutch(dated: Sequence[_Dated]) -> Iterator[CommonCause]:
-    """The fewest runs without which cycles do not fall from date to date."""
+    """The hypothesis of another clutch among the runs: the fewest runs without which cycles do not fall from date to
+    date."""
     if all(earlier.start <= later.start for earlier, later in itertools.pairwise(dated)):
         return
     own = longest_rise([run.start for run in dated])

@@ -48,7 +48,8 @@ class Tests:
 
 
 def _own_clock(cycles: FloatArray, latest: float) -> FloatArray:
-    """u at cycles [k] by every scale [scales, k]; where no test was made after the start, any further one is at u = 1.
+    """Clock u of the course at cycles [k] for every scale [scales, k]; where no test was made after the start, any
+    further one is at u = 1.
 
     Cycles of which floats cannot hold the inverse are none.
     """
@@ -62,7 +63,7 @@ def _own_clock(cycles: FloatArray, latest: float) -> FloatArray:
 
 @dataclass(frozen=True)
 class CourseFit:
-    """The tests of a life taken in, and what they say of further ones.
+    """The posterior of log COF's course given the tests of a life, from which further tests are predicted.
 
     At a node y - level = A w + scatter with w standard normal: A holds level and steps, the change and δ in their prior
     deviations, d the variance of every test about its course. With M = I + AᵀA/d = LLᵀ and N = L⁻¹Aᵀ/d the inverse of the
@@ -72,7 +73,8 @@ class CourseFit:
     tests: Tests
 
     def _columns(self, cycles: FloatArray, epoch: FloatArray, stretches: int = PAST + FUTURE) -> FloatArray:
-        """A at cycles [k] in epochs [k]; [g, k, p], with so many of δ's stretches last, those after T behind the others."""
+        """Design matrix A [g, k, p] at cycles [k] in epochs [k], with the columns of so many of δ's stretches last,
+        stretches after T behind the others."""
         u = _own_clock(cycles, self.latest)
         levels = [criteria.LEVEL_SD * (cycles >= at) for at in self.tests.levels]
         steps = [criteria.STEP_SD * (epoch > e) for e in np.unique(self.tests.epoch)]
@@ -86,73 +88,75 @@ class CourseFit:
 
     @cached_property
     def latest(self) -> float:
-        """T."""
+        """Cycles T of the latest test."""
         return float(self.tests.cycles.max(initial=0.0))
 
     @cached_property
     def noise(self) -> FloatArray:
-        """Variance of every test about its course, d [g, n]."""
+        """Variance d [g, n] of every test about its course."""
         return np.asarray(self.tests.variance + np.square(_NODES[:, 3, None]))
 
     @cached_property
     def _own(self) -> FloatArray:
-        """A of the tests [g, n, p], without the stretches after T."""
+        """Design matrix A [g, n, p] of the tests, without the stretches after T."""
         return self._columns(self.tests.cycles, self.tests.epoch, PAST)
 
     @cached_property
     def _root(self) -> FloatArray:
-        """L⁻¹ [g, p, p]."""
+        """Inverse Cholesky factor L⁻¹ [g, p, p]."""
         weighted = np.swapaxes(self._own, 1, 2) / self.noise[:, None]
         return np.asarray(np.linalg.inv(np.linalg.cholesky(np.eye(weighted.shape[1]) + weighted @ self._own)))
 
     @cached_property
     def _explained(self) -> FloatArray:
-        """N [g, p, n]."""
+        """Matrix N [g, p, n]."""
         return np.asarray(self._root @ np.swapaxes(self._own, 1, 2) / self.noise[:, None])
 
     @cached_property
     def _off(self) -> FloatArray:
-        """y - level [n]."""
+        """Deviation y - level [n] of log COF."""
         return np.asarray(self.tests.log_cof - self.tests.level)
 
     @cached_property
     def pull(self) -> FloatArray:
-        """P (y - level) [g, n]."""
+        """Precision-weighted deviation P (y - level) [g, n]."""
         pulled = (self._explained @ self._off)[:, None] @ self._explained
         return np.asarray(self._off / self.noise - pulled[:, 0])
 
     @cached_property
     def log_evidence_by_node(self) -> FloatArray:
-        """log density of the tests under every node [g]."""
+        """Log density of the tests under every node [g]."""
         roots = np.diagonal(self._root, axis1=1, axis2=2)
         log_volume = 0.5 * np.log(self.noise).sum(axis=1) - np.log(roots).sum(axis=1)
         return np.asarray(-0.5 * (self.pull @ self._off) - log_volume - 0.5 * self._off.size * math.log(2.0 * math.pi))
 
     @property
     def log_evidence(self) -> float:
-        """log density of the tests."""
+        """Log density of the tests, averaged over the nodes."""
         return float(np.logaddexp.reduce(self.log_evidence_by_node)) - math.log(len(_NODES))
 
     @cached_property
     def log_weight(self) -> FloatArray:
-        """log posterior probability of the nodes [g]."""
+        """Log posterior probability of the nodes [g]."""
         return np.asarray(self.log_evidence_by_node - np.logaddexp.reduce(self.log_evidence_by_node))
 
     @cached_property
     def without(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Each test as the others predict it: mean [g, n], variance of the test [g, n], log weight of the nodes [g, n]."""
+        """Leave-one-out prediction of each test by the others: mean [g, n], variance of the test [g, n], log weight of
+        the nodes [g, n]."""
         variance = 1.0 / (1.0 / self.noise - np.square(self._explained).sum(axis=1))
         mean = self.tests.log_cof - self.pull * variance
         log_weight = self.log_weight[:, None] - log_normal(self.tests.log_cof - mean, variance)
         return mean, variance, log_weight - np.logaddexp.reduce(log_weight, axis=0)
 
     def misses(self) -> FloatArray:
-        """How far each test [n] is from where the others predict it: log density lost against its middle."""
+        """Log density [n] that each test loses against the middle of its leave-one-out prediction."""
         mean, variance, log_weight = self.without
         return missed(self.tests.log_cof - mean, variance, log_weight)
 
     def log_step_gains(self) -> FloatArray:
-        """By how much the log evidence would grow by a new level from each test on [n]; 0 for the first."""
+        """Gain [n] of log evidence by a new level from each test on; 0 for the first, -inf for a further test at the
+        same cycles."""
         order = np.argsort(self.tests.cycles, kind="stable")[::-1]
         explained = np.square(self._explained[:, :, order].cumsum(axis=2)).sum(axis=1)
         volume = (1.0 / self.noise[:, order]).cumsum(axis=1) - explained
@@ -169,7 +173,7 @@ class CourseFit:
         return alone
 
     def predict(self, cycles: FloatArray, epoch: FloatArray) -> "Predicted":
-        """y at cycles [m] since the life began in epochs [m]."""
+        """Predictive distribution of log COF y at cycles [m] since the life began, in epochs [m]."""
         columns = self._columns(cycles, epoch)
         turned = columns[..., :-FUTURE] @ np.swapaxes(self._root, 1, 2)
         mean = self.tests.level + (turned @ (self._explained @ self._off)[..., None])[..., 0]
@@ -179,18 +183,18 @@ class CourseFit:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Predicted:
-    """A mixture of normals: log weight [g], mean [g, m] and variance [g, m] of log COF."""
+    """A mixture of normal distributions of log COF: log weight [g], mean [g, m] and variance [g, m]."""
 
     log_weight: FloatArray
     mean: FloatArray
     variance: FloatArray
 
     def at(self, places: NDArray[np.intp]) -> "Predicted":
-        """The prediction at these places of its cycles [k]."""
+        """The prediction at the indices [k] of its cycles."""
         return replace(self, mean=self.mean[:, places], variance=self.variance[:, places])
 
     def log_density(self, log_cof: FloatArray, spread: FloatArray, new_level: FloatArray) -> FloatArray:
-        """log density [m] of log COF [m] whose own deviation is `spread` [m], at the cycles of the prediction; with
+        """Log density [m] of log COF [m], of measurement deviation `spread` [m], at the cycles of the prediction; with
         probability `new_level` [m] COF has a new level there."""
         off, variance, weight = log_cof - self.mean, self.variance + spread**2, self.log_weight[:, None]
         same = np.log1p(-new_level) + log_unless_outlying(off, variance, weight)
@@ -198,7 +202,7 @@ class Predicted:
         return np.asarray(np.logaddexp(same, np.log(np.maximum(new_level, 1e-300)) + stepped))
 
     def interval(self, index: int, spread: float) -> tuple[float, float]:
-        """COF two deviations below and above its mean at the cycles of that index."""
+        """COF two standard deviations below and above its mean at the cycles of that index."""
         weight = np.exp(self.log_weight)
         mean = float(weight @ self.mean[:, index])
         square = float(weight @ (self.variance[:, index] + (self.mean[:, index] - mean) ** 2)) + spread**2
@@ -206,20 +210,21 @@ class Predicted:
 
 
 def log_unless_outlying(off: FloatArray, variance: FloatArray, log_weight: FloatArray) -> FloatArray:
-    """log density [m] of what is `off` its mean [g, m] under nodes of weight [g, m], where a share of tests is outlying."""
+    """Log density [m] of a deviation `off` from the mean [g, m] under normal nodes of log weight [g, m], contaminated
+    by the share of outlying tests with its larger variance."""
     plain = math.log1p(-criteria.OUTLYING_SHARE) + log_normal(off, variance)
     further = math.log(criteria.OUTLYING_SHARE) + log_normal(off, variance + criteria.OUTLYING_SD**2)
     return np.asarray(np.logaddexp.reduce(log_weight + np.logaddexp(plain, further), axis=0))
 
 
 def missed(off: FloatArray, variance: FloatArray, log_weight: FloatArray) -> FloatArray:
-    """log density [m] that is lost by being `off` the mean [g, m]."""
+    """Log density [m] lost by the deviation `off` from the mean [g, m]."""
     return np.asarray(
         log_unless_outlying(0.0 * off, variance, log_weight) - log_unless_outlying(off, variance, log_weight)
     )
 
 
 def log_physics(log_cof: FloatArray) -> FloatArray:
-    """log of how far physics allows a COF, any shape: 0 for what wet clutches have, less beyond."""
+    """Log plausibility of a COF by physics, any shape: 0 for usual values of wet clutches, negative beyond."""
     beyond = np.abs(log_cof - math.log(criteria.COF)) / criteria.LOG_COF_SD - criteria.USUAL
     return np.asarray(-0.5 * np.maximum(beyond, 0.0) ** 2)

@@ -39,21 +39,23 @@ _WORTH = 1e-6
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Belief:
-    """Indices of the runs that slipped, of outlying tests, and of tests from which on COF has a new level."""
+    """A hypothesis on all runs: indices of the runs that slipped, of outlying tests, and of tests from which on COF has
+    a new level."""
 
     slipped: frozenset[int] = frozenset()
     outlying: frozenset[int] = frozenset()
     levels: frozenset[int] = frozenset()
 
     def turned(self, run: int) -> "Belief":
-        """A run slipped that did not, or did not that slipped; all else is the same."""
+        """The belief with one run's slip reversed; a run that slipped is neither outlying nor the beginning of a
+        level."""
         return Belief(slipped=self.slipped ^ {run}, outlying=self.outlying - {run}, levels=self.levels - {run})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SlipVerdict:
-    """Of a run that probably slipped: the most probable slip, COF where the others put it [-, -] (None: it shows none)
-    at the cycles as sent, and whether its date is out of order with theirs."""
+    """The verdict on a run that probably slipped: the most probable slip, the COF interval expected from the others
+    [-, -] at the cycles as sent (None: the run shows none), and whether its date is out of order with theirs."""
 
     slip: Slip
     expected: tuple[float, float] | None
@@ -66,8 +68,8 @@ class SlipVerdict:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JointJudgement:
-    """Verdicts on the runs that are to be held, by index; the tests of which can be said whether COF has a new level from
-    them on, and those from which on it has."""
+    """Verdicts on the runs that are to be held, by index; the tests at which a new level of COF can be judged, and
+    those at which one begins."""
 
     held: Mapping[int, SlipVerdict]
     tests: frozenset[int]
@@ -88,7 +90,8 @@ def judge(runs: Sequence[Run], about: Collection[int] = ()) -> JointJudgement:
 
 
 def log_probability_of(runs: Sequence[Run]) -> float:
-    """Log probability of all that runs show, in the order of their history, summed over the beliefs that are met."""
+    """Log probability of all the runs' numbers, in the order of their history, summed over the beliefs visited by the
+    search."""
     met = _searched(_Clutch(runs=tuple(runs), about=frozenset()))[1]
     return float(np.logaddexp.reduce(list(met.values())))
 
@@ -100,7 +103,7 @@ def log_cycles_of(runs: Sequence[Run]) -> float:
 
 
 def _held(clutch: "_Clutch", best: "_Weighed", weighed: dict[Belief, float]) -> dict[int, SlipVerdict]:
-    """Verdicts on the runs that probably slipped, by the beliefs that were met."""
+    """Verdicts on the runs that probably slipped, by the beliefs visited by the search."""
     weighed |= {other: _Weighed(clutch=clutch, belief=other).log_probability for other in best.instead()}
     doubts = any(log_odds >= math.log(criteria.HELD) for log_odds in best.log_odds.values())
     if not (best.belief.slipped or doubts or len(weighed) > 1):
@@ -121,8 +124,8 @@ def _held(clutch: "_Clutch", best: "_Weighed", weighed: dict[Belief, float]) -> 
 
 
 def _searched(clutch: "_Clutch") -> tuple["_Weighed", dict[Belief, float]]:
-    """The belief that no single change improves, from the one that all runs are as sent; and the log probability of all
-    that were met on the way."""
+    """The local optimum of the greedy search, from the belief that all runs are as sent, and the log probability of
+    every belief visited."""
     now = _Weighed(clutch=clutch, belief=Belief())
     met = {now.belief: now.log_probability}
     for _ in range(16):  # changes at most
@@ -139,7 +142,7 @@ def _searched(clutch: "_Clutch") -> tuple["_Weighed", dict[Belief, float]]:
 
 @dataclass(frozen=True)
 class _Clutch:
-    """All runs, and what depends on no belief."""
+    """All runs of a clutch, with the quantities that are the same under every belief."""
 
     runs: tuple[Run, ...]
     about: frozenset[int]
@@ -147,7 +150,8 @@ class _Clutch:
     _weighed_slips: dict[int, list[Slip]] = field(default_factory=dict)
 
     def slips(self, index: int, expected: float) -> list[Slip]:
-        """All slips of a run; its cycles were most likely `expected` where they are mistaken altogether."""
+        """All slips that a run may have suffered; if its cycles are mistaken altogether, they were most likely
+        `expected`."""
         run = self.runs[index]
         if index not in self._weighed_slips:
             self._weighed_slips[index] = list(slips_of(run, expected))
@@ -158,22 +162,22 @@ class _Clutch:
 
     @cached_property
     def place(self) -> dict[int, int]:
-        """The place of each run of `near`."""
+        """Index of each run within `near`."""
         return {i: k for k, i in enumerate(self.near)}
 
     @cached_property
     def cycles(self) -> FloatArray:
-        """As sent [n]."""
+        """Cycles [n] of the runs as sent."""
         return np.array([run.cycles for run in self.runs])
 
     @cached_property
     def centres(self) -> FloatArray:
-        """The cycles about which runs are looked at."""
+        """Cycles around which runs are judged: those of the runs asked about, and the latest."""
         return np.append(self.cycles[sorted(self.about)], self.cycles.max(initial=0.0))
 
     @cached_property
     def near(self) -> list[int]:
-        """The runs whose cycles are looked at, in the order of the history."""
+        """The runs whose cycles are judged, the 80 nearest to the centres, in the order of the history."""
         return self._nearest(range(len(self.runs)), 80)
 
     @cached_property
@@ -182,7 +186,7 @@ class _Clutch:
 
     @cached_property
     def tests(self) -> list[int]:
-        """The tests that are looked at."""
+        """The tests whose COF is judged, the 40 nearest to the centres."""
         return self._nearest(self.all_tests, 40)
 
     @cached_property
@@ -191,26 +195,27 @@ class _Clutch:
 
     @cached_property
     def shifts(self) -> list[int]:
-        """The events that may have shifted the level."""
+        """Indices of the events that may have shifted the level of COF."""
         return [i for i, run in enumerate(self.runs) if run.shift]
 
     @cached_property
     def followed(self) -> frozenset[int]:
-        """The tests that are looked at with the five right before them, by which a new level is seen."""
+        """The judged tests of which the five tests right before are judged too, so that a new level can be seen."""
         tests, known_tests = self.all_tests, set(self.tests)
         places = (bisect.bisect_left(tests, i) for i in self.tests)
         return frozenset(tests[k] for k in places if known_tests.issuperset(tests[max(k - 5, 0) : k + 1]))
 
     @cached_property
     def compared(self) -> frozenset[int]:
-        """The runs that are no farther away than the tests that are looked at: beyond these the course is only a guess."""
+        """The runs nearer to the centres than every test left out: beyond these the course is only a guess."""
         left_out = sorted(set(self.all_tests).difference(self.tests))
         reach = self._apart(left_out).min(initial=math.inf)
         return frozenset(np.flatnonzero(self._apart(range(len(self.runs))) < reach).tolist())
 
     @cached_property
     def doubtable(self) -> list[int]:
-        """All runs but tests too far away to be looked at, which are as sent in every belief and add the same to each."""
+        """The runs that may have slipped: all but tests too far away to be judged, which are as sent in every belief
+        and add the same to each."""
         far = set(self.all_tests).difference(self.compared, self.tests, self.about)
         return sorted(set(range(len(self.runs))) - far)
 
@@ -221,7 +226,7 @@ class _Clutch:
         return sorted(indices[k] for k in nearest[:most].tolist())
 
     def _apart(self, indices: Sequence[int]) -> FloatArray:
-        """How far runs are from what is looked at [k]."""
+        """Distance [k] in cycles of runs from the nearest centre."""
         return np.asarray(np.abs(self.cycles[list(indices), None] - self.centres).min(axis=1))
 
     @cached_property
@@ -234,7 +239,7 @@ class _Clutch:
 
     @cached_property
     def dated(self) -> list[int]:
-        """Places in `near` of the runs with a date."""
+        """Indices within `near` of the runs with a date."""
         return [k for k, i in enumerate(self.near) if self.runs[i].moment is not None]
 
     @cached_property
@@ -242,7 +247,7 @@ class _Clutch:
         return np.array([self.runs[self.near[k]].moment for k in self.dated], dtype=np.float64)
 
     def surprise(self, cycles: FloatArray) -> FloatArray:
-        """log P [n] of the cycles and dates of each run of `near` given the others."""
+        """Log probability [n] of the cycles and dates of each run of `near` given the others."""
         total = pace.log_given_others(cycles, self.rank, self.block)
         if self.dated:
             start = cycles[self.dated] - np.nan_to_num(self.block[self.dated])
@@ -253,7 +258,7 @@ class _Clutch:
         return total
 
     def log_cycles(self, sets: FloatArray) -> FloatArray:
-        """log P [h] of cycles and dates of `near`; [h, n]."""
+        """Log probability [h] of the cycles and dates of `near`, for sets of cycles [h, n]."""
         total = pace.log_probability(sets, self.rank, self.block)
         if self.dated:
             start = sets[:, self.dated] - np.nan_to_num(self.block[self.dated])
@@ -263,7 +268,7 @@ class _Clutch:
 
 @dataclass(frozen=True)
 class _Weighed:
-    """A belief, its log probability, and what single changes of it would gain."""
+    """A belief with its log probability and the gains of its single changes."""
 
     clutch: _Clutch
     belief: Belief
@@ -284,7 +289,7 @@ class _Weighed:
         return [i for i in self.clutch.rebuilds if i not in self.belief.slipped]
 
     def life_of(self, index: int) -> int:
-        """The life of a run, by its place in the history."""
+        """The index of the life to which a run belongs, by the run's index in the history."""
         return bisect.bisect_right(self._rebuilds, index)
 
     @cached_property
@@ -302,7 +307,7 @@ class _Weighed:
         return fits
 
     def _fit(self, own: Sequence[int], life: int, level: float, level_sd: float) -> CourseFit:
-        """The course of a life by these of its tests."""
+        """The course of a life fitted to the tests `own`."""
         origin, belief = self.origins[life], self.belief
         shifts = self._shifts(life)
         outlying, levels = (tuple(i for i in own if i in chosen) for chosen in (belief.outlying, belief.levels))
@@ -324,7 +329,7 @@ class _Weighed:
         return self.clutch.fits[key]
 
     def _without(self, index: int, life: int) -> CourseFit:
-        """The course of a life without one of its tests."""
+        """The course of a life fitted without one of its tests."""
         fit, fitted_tests = self.fits[life]
         if index not in fitted_tests:
             return fit
@@ -337,7 +342,7 @@ class _Weighed:
 
     @cached_property
     def log_probability(self) -> float:
-        """log probability of the belief with all runs, up to a constant of the runs."""
+        """Log probability of the belief with all runs, up to a constant of the runs."""
         total = self.base
         for i in self.clutch.doubtable:
             run = self.clutch.runs[i]
@@ -350,14 +355,16 @@ class _Weighed:
 
     @cached_property
     def base(self) -> float:
-        """The part of the tests' course, of cycles and dates, and the prior of the belief."""
+        """Log probability of the tests under their course, of cycles and dates, and of the belief a priori; slips
+        excluded."""
         total = sum(fit.log_evidence for fit, fitted_tests in self.fits if fitted_tests)
         total += len(self.belief.outlying) * _log_odds(criteria.OUTLYING_SHARE)
         total += sum(self._log_level(i) for i in self.belief.levels)
         return total + float(self.clutch.log_cycles(self._sets([]))[0])
 
     def _sets(self, changes: Sequence[Mapping[int, float]]) -> FloatArray:
-        """The cycles of `near` as the belief has them, and with each of the changes; infinite: none. [1 + h, n]."""
+        """Sets of cycles [1 + h, n] of `near`: as the belief has them, and with each of the changes; infinite for a run
+        that is left out."""
         place = self.clutch.place
         now = self.clutch.cycles[self.clutch.near].copy()
         now[[k for i, k in place.items() if i in self.belief.slipped]] = math.inf
@@ -368,7 +375,7 @@ class _Weighed:
         return sets
 
     def _log_level(self, test: int) -> float:
-        """log prior that a new level begins with a test."""
+        """Log prior probability that a new level begins with a test."""
         return math.log(self._new_level_probability(self.life_of(test), self.clutch.runs[test].sent.cycles))
 
     def _new_level_probability(self, life: int, cycles: float) -> float:
@@ -382,13 +389,15 @@ class _Weighed:
         return criteria.LEVEL_AFTER_EVENT if declared else criteria.LEVEL_UNDECLARED
 
     def _new_level(self, index: int, life: int, cycles: float) -> float:
-        """Log probability of a new level from this test on; later tests would have it too. 0 before the first test."""
+        """Prior probability of a new level from this test on, if the test is later than all others of its life; 0
+        otherwise, for later tests would have the level too."""
         runs = self.clutch.runs
         other_cycles = [runs[i].sent.cycles for i in self.fits[life][1] if i != index]
         return self._new_level_probability(life, cycles) if other_cycles and max(other_cycles) < cycles else 0.0
 
     def log_cof(self, index: int, readings: Sequence[RunReading]) -> list[float]:
-        """log density of the COF of readings of a run by the course of the others; 0 for one that shows none."""
+        """Log density of the COF of a run's readings under the course of the other tests; 0 for a reading without
+        COF."""
         run, life = self.clutch.runs[index], self.life_of(index)
         shown = [reading for reading in readings if reading.log_cof is not None]
         if not shown:
@@ -409,7 +418,7 @@ class _Weighed:
         return [values.get(id(reading), 0.0) for reading in readings]
 
     def _predicted(self, index: int, life: int, cycles: FloatArray) -> Predicted:
-        """log COF at cycles [m] of a life by the tests without that run."""
+        """Predictive distribution of log COF at cycles [m] of a life, from its tests without that run."""
         epoch = _epoch(self._shifts(life), cycles)
         return self._without(index, life).predict(np.maximum(cycles - self.origins[life], 0.0), epoch)
 
@@ -417,8 +426,8 @@ class _Weighed:
         return max((life for life, origin in enumerate(self.origins) if origin <= cycles), default=0)
 
     def expected(self, index: int) -> float:
-        """The cycles at which a run that mistook them was most likely made: one gap after the last of its kind, or where
-        its block ends after the last run."""
+        """The most likely true cycles of a run whose cycles are mistaken: one gap after the latest run, the last gap of
+        its kind, or the latest run plus its block."""
         run = self.clutch.runs[index]
         near = [i for i in self.clutch.near if i not in self.belief.slipped and i != index]
         latest = max((self.clutch.runs[i].sent.cycles for i in near), default=0.0)
@@ -433,8 +442,8 @@ class _Weighed:
         return np.unique(self.clutch.cycles[same_kind]) if same_kind else np.zeros(0)
 
     def weigh(self, index: int) -> tuple[float, float, Slip] | None:
-        """Weights of a run and its most probable slip: log L as sent, and log Σ P(slip) L with the slip undone. None if it
-        can have none."""
+        """Log weights of a run as sent, log L, and with its slip undone, log Σ P(slip) L, and its most probable slip;
+        None if it can have no slip."""
         if index not in self._weighed_slips:
             self._weighed_slips[index] = self._slip_of(index)
         return self._weighed_slips[index]
@@ -459,7 +468,7 @@ class _Weighed:
         return as_sent, float(np.logaddexp.reduce(weights)) + confirmed, slips[int(np.argmax(weights))]
 
     def _log_cycles(self, index: int, cycles: Sequence[float]) -> list[float]:
-        """log P of a run's cycles given the others."""
+        """Log probability of a run's cycles, for each of several values, given the other runs."""
         if index not in self.clutch.place:
             return [0.0] * len(cycles)
         values, of = np.unique(cycles, return_inverse=True)
@@ -469,8 +478,9 @@ class _Weighed:
 
     @cached_property
     def suspects(self) -> frozenset[int]:
-        """The runs that surprise most, of those that a slip might explain better: by COF given the others, and by cycles,
-        pressures, speeds and oil beside the others of their kind. One without others is always asked about."""
+        """The at most four runs of largest surprise, if a slip might explain them better: surprise is lost log density
+        of COF given the others, plus that of cycles, pressures, speeds and oil beside the others of their kind. A run
+        without others of its kind is always a suspect."""
         runs = self.clutch.runs
         of_cycles = dict(zip(self.clutch.near, self.clutch.surprise(self._sets([])[0]).tolist(), strict=True))
         kept = (i for i in self.clutch.near if i not in self.belief.slipped)
@@ -496,7 +506,8 @@ class _Weighed:
         return frozenset(odd[:4])
 
     def _misses(self, shows: Sequence[int], life: int, fit: CourseFit) -> FloatArray:
-        """How far the COF of runs that are no tests [k] is from the course: log density lost against its middle."""
+        """Log density [k] that the COF of runs which are no tests loses against the middle of the course's
+        prediction."""
         sent = [self.clutch.runs[i].sent for i in shows]
         cycles = np.array([reading.cycles for reading in sent])
         predicted = fit.predict(np.maximum(cycles - self.origins[life], 0.0), _epoch(self._shifts(life), cycles))
@@ -506,12 +517,13 @@ class _Weighed:
 
     @cached_property
     def log_odds(self) -> dict[int, float]:
-        """log odds of a slip for every run that is asked about, all else as the belief has it."""
+        """Log odds of a slip for every suspect and every run believed to have slipped, all else as the belief has
+        it."""
         questioned = sorted(self.suspects | self.belief.slipped)
         return {i: slips[1] - slips[0] for i in questioned if (slips := self.weigh(i)) is not None}
 
     def moves(self) -> Iterator[tuple[Belief, float]]:
-        """Single changes, and by how much they would change the log probability, about."""
+        """Single changes of the belief, each with the approximate gain in log probability."""
         belief = self.belief
         for i, log_odds in self.log_odds.items():
             gain = -log_odds if i in belief.slipped else log_odds
@@ -537,7 +549,7 @@ class _Weighed:
                     yield replace(belief, levels=belief.levels | {i}), float(gains[k]) + self._log_level(i)
 
     def instead(self) -> Iterator[Belief]:
-        """A slip in place of the latest test of a life where that is outlying, or begins a level that none has after it."""
+        """Beliefs with a slip in place of an outlier or new level at the latest test of a life."""
         belief = self.belief
         for _, fitted_tests in self.fits:
             i = max(fitted_tests, key=lambda j: float(self.clutch.cycles[j]), default=-1)
@@ -545,7 +557,8 @@ class _Weighed:
                 yield belief.turned(i)
 
     def verdict(self, index: int) -> SlipVerdict:
-        """What is said of a run that is doubted."""
+        """The verdict on a doubted run: its most probable slip, the COF expected at its cycles, and its place among
+        runs of its kind."""
         sent = self.clutch.runs[index].sent
         weighed = self.weigh(index)
         slip = Slip(name=OTHER_CYCLES, log_prior=0.0, likely=sent) if weighed is None else weighed[2]
@@ -571,7 +584,8 @@ class _Weighed:
         return self._predicted(index, life, np.array([reading.cycles])).interval(0, reading.spread)
 
     def _against_time(self, index: int) -> bool:
-        """Whether a run that is as sent began at fewer cycles and later, or at more and earlier."""
+        """Whether a run's date contradicts a run that is as sent: fewer cycles but later, or more cycles but
+        earlier."""
         run = self.clutch.runs[index]
         if run.moment is None:
             return False
@@ -588,5 +602,5 @@ def _log_odds(share: float) -> float:
 
 
 def _epoch(shifts: FloatArray, cycles: FloatArray) -> FloatArray:
-    """How many events come before cycles [m]; [m]."""
+    """Number [m] of events before cycles [m]."""
     return np.asarray((shifts[None, :] <= cycles[:, None]).sum(axis=1), dtype=np.float64)

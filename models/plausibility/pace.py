@@ -30,12 +30,13 @@ _LEAST = 1e-30
 
 
 def rank_of(kind: str) -> int:
-    """The place of a kind in `ORDER`."""
+    """The position of a kind in `ORDER`; after the last for a kind that is not listed."""
     return ORDER.index(kind) if kind in ORDER else len(ORDER)
 
 
 def roundness(cycles: FloatArray | float, scale: FloatArray | float) -> FloatArray:
-    """How many times as probable cycles are as if any number were, both of one shape; they are rounded by `scale` at most.
+    """Factor by which round cycles are more probable than under a law without round numbers, of the shape of cycles and
+    `scale`; they are rounded by `scale` at most.
 
     People and rigs plan in round numbers: a share ROUND of all numbers are multiples of 1, 2, 2.5, 5, 10, 20 and so on, each
     grain G from a thousandth of `scale` on as probable as the others. R = 1 - ROUND + ROUND mean(G [G divides the cycles]).
@@ -52,20 +53,21 @@ def roundness(cycles: FloatArray | float, scale: FloatArray | float) -> FloatArr
 
 
 def log_anywhere(cycles: FloatArray | float) -> FloatArray:
-    """log density of a number of cycles of which nothing is known, any shape: even over its logarithm but for round ones,
-    and falling beyond what clutches last."""
+    """Log density of a number of cycles of which nothing is known, any shape: log-uniform except for round numbers, and
+    falling beyond the usual life of clutches."""
     return np.asarray(_log_of_any(cycles) + np.log(roundness(cycles, cycles)))
 
 
 def _log_of_any(cycles: FloatArray | float) -> FloatArray:
-    """Log probability of any cycles, if no number is round; 0.7 is the deviation of the logarithm beyond."""
+    """Log density of any cycles if no number is round; 0.7 is the deviation of the logarithm beyond MAX_CYCLES."""
     at = np.maximum(cycles, 1.0)
     beyond = np.maximum(np.log(at / criteria.MAX_CYCLES), 0.0) / 0.7
     return np.asarray(-np.log(at * math.log(1e8 / 1e1)) - 0.5 * beyond**2)
 
 
 def log_probability(cycles: FloatArray, rank: NDArray[np.intp], block: FloatArray) -> FloatArray:
-    """log P [h] of h sets of cycles [h, n] of runs of a kind `rank` [n] whose blocks are so long (nan: none) [n].
+    """Log probability [h] of h sets of cycles [h, n] of runs of kind `rank` [n] with block lengths `block` [n] (nan: no
+    block).
 
     Cycles are infinite where a run is not among a set.
     """
@@ -82,7 +84,8 @@ def log_probability(cycles: FloatArray, rank: NDArray[np.intp], block: FloatArra
 
 
 def log_given_others(cycles: FloatArray, rank: NDArray[np.intp], block: FloatArray) -> FloatArray:
-    """log P [n] of each run's cycles [n] given those of the others; 0 for a run that is not there."""
+    """Log probability [n] of each run's cycles [n] given those of the others; 0 for a run that is left out (infinite
+    cycles)."""
     is_known = np.isfinite(cycles)
     finite = np.where(is_known, cycles, -1.0)
     meets, left, in_life = _meets(cycles[None], finite[None], rank, block)
@@ -102,8 +105,8 @@ def log_given_others(cycles: FloatArray, rank: NDArray[np.intp], block: FloatArr
 def _meets(
     cycles: FloatArray, finite: FloatArray, rank: NDArray[np.intp], block: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """P [h, n] of runs that meet others, the share [n] that is left for those that do not, and the density [h, n] of cycles
-    anywhere in the life."""
+    """Probability [h, n] that a run is made at cycles given by other runs, the remaining share [n] for other cycles,
+    and the density [h, n] of cycles anywhere in the life."""
     is_block = np.isfinite(block)
     length = np.where(is_block, block, 1.0)
     with np.errstate(invalid="ignore"):
@@ -127,7 +130,8 @@ def _meets(
 
 
 def _anywhere_in_life(finite: FloatArray) -> FloatArray:
-    """Density [h, n] of cycles that may be any of those up to the latest of the other runs, or as many again."""
+    """Density [h, n] of cycles anywhere in a life: uniform up to the latest of the other runs, and to twice that, with
+    a log-uniform rest."""
     ordered = np.sort(finite, axis=1)
     latest = np.where(finite >= ordered[:, -1:], ordered[:, -2:-1] if finite.shape[1] > 1 else 0.0, ordered[:, -1:])
     share = np.where(finite <= latest, criteria.WITHIN, np.where(finite <= 2.0 * latest, criteria.BEYOND, 0.0))
@@ -136,7 +140,7 @@ def _anywhere_in_life(finite: FloatArray) -> FloatArray:
 
 
 def _by_gaps(cycles: FloatArray) -> FloatArray:
-    """p [h, k] of each run's gap to the one before of its kind, in the places of the runs."""
+    """Probability p [h, k] of each run's gap to the run before of its kind, in the order of the runs."""
     order = np.argsort(cycles, axis=1)
     ascending = np.take_along_axis(cycles, order, axis=1)
     first = ascending[:, :1]
@@ -152,7 +156,8 @@ def _by_gaps(cycles: FloatArray) -> FloatArray:
 
 
 def _of_gaps(gaps: FloatArray, round_by: FloatArray) -> FloatArray:
-    """p [h, k] of gaps [h, k], each after those before it, and as much as the cycles after it are round."""
+    """Probability p [h, k] of gaps [h, k] given the gaps before each, times the roundness `round_by` [h, k] of the
+    cycles at their ends."""
     sets, count = gaps.shape
     padded = np.concatenate([np.zeros((sets, criteria.MEMORY)), gaps], axis=1)
     places = np.arange(count)[:, None] + criteria.MEMORY - 1 - np.arange(criteria.MEMORY)
@@ -179,13 +184,14 @@ def _of_gaps(gaps: FloatArray, round_by: FloatArray) -> FloatArray:
 
 
 def _log_normal(log_gap: FloatArray, centre: FloatArray, deviation: float) -> FloatArray:
-    """Density a cycle of a gap whose logarithm is normal."""
+    """Log-normal density [1/cycle] of a gap with centre and deviation of its logarithm."""
     z = (log_gap - centre) / deviation
     return np.asarray(np.exp(-0.5 * z * z - log_gap) / (deviation * math.sqrt(2 * math.pi)))
 
 
 def log_order(start: FloatArray, moment: FloatArray) -> FloatArray:
-    """log P [h] of the dates [n] of runs that begin at cycles [h, n], infinite where a run is not among a set.
+    """Log probability [h] of the order of the dates [n] of runs that begin at cycles [h, n], infinite where a run is
+    not in a set.
 
     How often a rig's runs are out of order is learned from them: a beta prior on it is integrated out.
     """

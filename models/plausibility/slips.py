@@ -21,7 +21,7 @@ OF_CLUTCH = (OTHER_CLUTCH, OTHER_TEST)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunReading:
-    """What a run shows, as sent or without a slip.
+    """The numbers of a run, as sent or corrected for a slip.
 
     `cycles` since new; `log_cof` the logarithm of mean COF as the stationary tests of its life show it and `spread` its own
     deviation, None for a run that shows none; `log_protocol` the log density of its pressures, speeds and oil.
@@ -35,7 +35,7 @@ class RunReading:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Slip:
-    """A slip, the log of its prior odds, the unit that it is about, and the run without it."""
+    """A slip with the log of its prior odds, the unit it concerns, and the run as it would be without it."""
 
     name: str
     log_prior: float
@@ -72,12 +72,13 @@ class Run(_RunFields):
 
     @cached_property
     def sent(self) -> RunReading:
-        """The run as it came in."""
+        """The run's numbers as it came in."""
         return self.reading()
 
 
 def slips_of(run: Run, expected: float) -> Iterator[Slip]:
-    """All slips of a run; its cycles were most likely `expected` where they are mistaken altogether."""
+    """All slips that a run may have suffered, with their prior odds; if its cycles are mistaken altogether, they were
+    most likely `expected`."""
     sent, anywhere = run.sent, float(log_anywhere(run.sent.cycles))
     for name, values in mistyped(sent.cycles).items():
         for cycles in values:
@@ -98,7 +99,7 @@ def slips_of(run: Run, expected: float) -> Iterator[Slip]:
 
 
 def mistyped(cycles: float) -> dict[str, list[float]]:
-    """What `cycles` may have been before a slip of the fingers."""
+    """The possible true cycles behind mistyped `cycles`, by slip: a zero too many, a lost zero, swapped digits."""
     if not cycles.is_integer() or cycles < 1 or cycles >= 1e12:
         return {}
     digits = str(int(cycles))

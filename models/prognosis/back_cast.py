@@ -34,9 +34,10 @@ from models.tracking.prior import TrackPrior
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BackCast:
-    """`forecasts` [f, 2 + 3 a]: progress and epoch of each, then at each of AHEAD its lower end, median and upper end;
-    `misses` [m] of the tests that were judged, negative where they lay below the median; `innovation` of the newest test by
-    those before it [1], or [0] where there is none (`models.tracking.innovation`)."""
+    """Kept forecasts of a clutch and their misses by later tests. `forecasts` [f, 2 + 3 a]: progress and epoch of each,
+    then at each of AHEAD its lower end, median and upper end; `misses` [m] of the tests that were judged, negative
+    where they lay below the median; `innovation` of the newest test by those before it [1], or [0] where there is none
+    (`models.tracking.innovation`)."""
 
     forecasts: FloatArray
     misses: FloatArray
@@ -44,27 +45,29 @@ class BackCast:
 
     @classmethod
     def nothing(cls) -> "BackCast":
-        """Before the first test."""
+        """The empty value, before the first test."""
         return cls(forecasts=np.zeros((0, 2 + 3 * len(AHEAD))), misses=np.zeros(0), innovation=np.zeros(0))
 
     @property
     def held(self) -> int:
-        """How many tests lay within the intervals that were forecast for them."""
+        """The number of tests within the 90 % intervals that were forecast for them."""
         return int(np.count_nonzero(np.abs(self.misses) <= 1.0))
 
     @property
     def surprising(self) -> bool:
-        """Whether so few tests are improbable, had each been within with 90 %."""
+        """Whether so few tests within their intervals are improbable (p < 0.05) if each is within with a probability of
+        90 %."""
         return bool(bdtr(self.held, self.misses.size, COVERAGE) < 0.05)
 
     @property
     def widening(self) -> tuple[float, float]:
-        """The powers w >= 1 of what lies before the median of remaining life, by tests below their forecasts, and of what
-        lies after it, by tests above them."""
+        """Powers w >= 1 that widen remaining life below its median, from tests below their forecasts, and above it,
+        from tests above them."""
         return _power(-self.misses), _power(self.misses)
 
     def judged(self, test: Measurement) -> "BackCast":
-        """With the miss of one more test, if there is a forecast that reaches it, and no event lies between."""
+        """The value with the miss of one more test added, if a kept forecast reaches the test and no event lies
+        between."""
         progress, epoch = self.forecasts[:, 0], self.forecasts[:, 1]
         usable = (
             (progress > 0.0)
@@ -83,7 +86,7 @@ class BackCast:
         return replace(self, misses=np.append(self.misses, max(-3.0, min(miss, 3.0))))  # it may be outlying
 
     def forecast(self, posterior: TrackPosterior, newest: Measurement, prior: TrackPrior) -> "BackCast":
-        """With the forecast of a posterior that knows all tests up to the newest."""
+        """The value with the forecast of a posterior added that knows all tests up to the newest."""
         _, ahead = bands(posterior, newest.progress * np.array(AHEAD))
         medians = ahead[:, 1]
         scatter = [math.sqrt(float(posterior.weight @ posterior.scatter_variance(x, prior))) for x in medians.tolist()]
@@ -94,7 +97,7 @@ class BackCast:
 
 
 def _power(misses: FloatArray) -> float:
-    """w by misses [m] that are positive on its side."""
+    """Power w of the widening from misses [m] that are positive on its side."""
     if misses.size == 0:
         return 1.0
     rank = min(math.ceil(0.5 * (1.0 + COVERAGE) * (misses.size + 1)), misses.size)

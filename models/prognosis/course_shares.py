@@ -16,7 +16,7 @@ from models.tracking.posterior import TrackPosterior
 
 
 class CourseName(StrEnum):
-    """What a course is called: that of eq. 6 levels off, of an order above 1."""
+    """The names of the kinds of course; eq. 6's levels off, with an order above 1."""
 
     EQ_6 = "eq6"
     SLOWING = "slowing"
@@ -25,8 +25,8 @@ class CourseName(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CourseProbability:
-    """A kind of course, its probability, and the median of its kinetics' order n = 1 + 1/ε [-]; None for a logarithm alone,
-    which has none."""
+    """A kind of course, its probability, and the median order n = 1 + 1/ε [-] of its kinetics; None for a logarithm
+    alone, which has no order."""
 
     name: CourseName
     probability: float
@@ -34,7 +34,7 @@ class CourseProbability:
 
 
 def course_shares(posterior: TrackPosterior) -> list[CourseProbability]:
-    """The kinds of course that have any probability, the most probable first."""
+    """The kinds of course of non-zero probability, most probable first."""
     accelerates = (posterior.exponent + 1.0) / posterior.scale < 0.0
     kinds = {
         CourseName.EQ_6: posterior.course == CourseForm.EQ_6,

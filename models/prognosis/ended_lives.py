@@ -70,9 +70,9 @@ _NO_LAWS = (0.0,) * len(CourseForm)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ObservedLife:
-    """A life's end [ζ] by the criterion's `fraction`, and its course until then: `progress` [t] and
-    `damage` [t] of its tests, the share of the way to the threshold; the mean energy [J] of its cycles, None where its duty
-    does not state it.
+    """An ended life: its end [ζ] by the criterion's `fraction`, and its course until then: `progress` [t] and `damage`
+    [t] of its tests, the share of the way to the threshold; the mean energy [J] of its cycles, None where its duty does
+    not state it.
 
     `deviation` is that of the logarithm of an uncertain end; of a `censored` life `end` is when it was taken out before it;
     `laws` are the probabilities that its whole course is each `CourseForm` with the least discrepancy.
@@ -89,11 +89,11 @@ class ObservedLife:
 
     @property
     def final_pace(self) -> float:
-        """The slope of its course over the last tenth of its life, in shares of the way over shares of the life."""
+        """Slope of the course over the last tenth of the life, d(damage)/d(share of life), at least 0.3."""
         return max(10.0 * (1.0 - self._inside(np.array(0.9)).item()), 0.3)  # never flatter than 0.3 of its mean pace
 
     def course(self, share: FloatArray) -> FloatArray:
-        """b at shares of its life >= 0, any shape: straight between its tests, and beyond its end."""
+        """Course b at shares of the life >= 0, any shape: linear between its tests and beyond its end."""
         return np.where(share > 1.0, 1.0 + self.final_pace * (share - 1.0), self._inside(share))
 
     def _inside(self, share: FloatArray) -> FloatArray:
@@ -105,7 +105,7 @@ class ObservedLife:
         return replace(self, end=self.end / cycles, progress=tuple(zeta / cycles for zeta in self.progress))
 
     def to_dict(self) -> dict[str, Any]:
-        """As JSON can carry it."""
+        """The life as values that JSON can carry."""
         return asdict(self) | {name: list(getattr(self, name)) for name in _COLUMNS}
 
     @classmethod
@@ -127,7 +127,7 @@ def ended_life(
     fraction: float,
     laws: tuple[float, ...] = _NO_LAWS,
 ) -> ObservedLife | None:
-    """What a life that ended at ζ = `end` > 0 teaches, by its tests at progress [n] >= 0 with values [n].
+    """The observed life of a clutch that ended at ζ = `end` > 0, from its tests at progress [n] >= 0 with values [n].
 
     `initial` > 0 is the value when new, `laws` as `new_and_laws` has them. None where it was measured at fewer than
     FEWEST_TESTS different ζ before its end.
@@ -144,7 +144,7 @@ def ended_life(
 
 
 def new_and_laws(history: Sequence[Measurement]) -> tuple[float, tuple[float, ...]]:
-    """Of a life by its measurements in order, as the exact filter has it under the weak prior: ξ0 in the mean, and the
+    """Posterior mean of ξ0 of a life by its measurements in order, by the exact filter under the weak prior, and the
     probabilities that its course is each `CourseForm` with the least discrepancy."""
     drawn = _drawn(history)
     lawful = drawn.weight * LEAST_DISCREPANCY[drawn.form]
@@ -160,7 +160,8 @@ def _drawn(history: Sequence[Measurement]) -> TrackPosterior:
 def declared_end(
     history: Sequence[Measurement], at: float, *, fraction: float, horizon: float, offset: Offset | None = None
 ) -> tuple[float, float]:
-    """The end [ζ] of a life that was declared worn at ζ = `at` > 0 before any test passed its threshold; and its log's sd.
+    """The estimated end [ζ] of a life that was declared worn at ζ = `at` > 0 before any test passed its threshold, and
+    the standard deviation of its logarithm.
 
     x = log T - log at is exponential with the mean DECLARED_EARLY, for nobody declares a life worn that has most of itself
     to come. The exact filter's draws of x >= 0, those before `at` being at it, are weighted by exp(-x/DECLARED_EARLY); and
@@ -177,8 +178,8 @@ def declared_end(
 
 
 def representative(lives: Sequence[ObservedLife], most: int = 40) -> list[ObservedLife]:
-    """The lives; of more than `most`, so many, evenly taken by their ends: with 40 their predictive is within 3 % of the
-    normal's width, and each costs every answer 0.1 ms."""
+    """The lives, or a subset of `most` of them, evenly chosen by their ends: with 40 their predictive is within 3 % of
+    the normal's width, and each costs every answer 0.1 ms."""
     if len(lives) <= most:
         return list(lives)
     ordered = sorted(lives, key=lambda life: life.end)
@@ -188,7 +189,7 @@ def representative(lives: Sequence[ObservedLife], most: int = 40) -> list[Observ
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Kin:
-    """What ended lives say of a clutch's end of life.
+    """Evidence of ended lives about a clutch's end of life.
 
     If a clutch takes one of their courses: `ends` [n] with weights [n] that sum to one, and the `log_odds` of its tests that
     it is of their kind. If it follows a law of its own filter, that knows the end, and `predictive` is that of
@@ -207,8 +208,8 @@ class Kin:
     def together(
         self, own: FloatArray, weight: FloatArray, form: NDArray[np.intp], as_of: float
     ) -> tuple[FloatArray, FloatArray]:
-        """The end of life as a sample with its weights, from a filter's `own` ends [n] with weights [n] that sum to one and
-        forms [n].
+        """The end of life as a weighted sample: a filter's `own` ends [n] with weights [n] that sum to one and forms
+        [n], combined with the ends of the kind.
 
         It holds these as they are (all of those behind `as_of`), under the forms' shares and weighted by the predictive, and
         `ends`. How much the clutch's tests speak for the forms of the kind is evidence against its courses. How well those
@@ -240,7 +241,7 @@ class Kin:
 def as_its_kind(
     tests: Sequence[Measurement], as_of: float, lives: Sequence[ObservedLife], offset: FloatArray | None = None
 ) -> Kin | None:
-    """The end of life of a clutch that is alive at ζ = `as_of` > 0, given its tests and lives that have ended.
+    """The evidence of ended lives for a clutch that is alive at ζ = `as_of` > 0, given its tests.
 
     `offset` [t] is added to the tests' values. None of fewer than two lives that are not censored, of fewer than
     FEWEST_TESTS tests at different ζ, or where the first value is not positive. Kept for the next filter, which asks it of
@@ -300,8 +301,8 @@ def _as_its_kind(
 
 
 def _forms(first: Measurement, lives: Sequence[ObservedLife]) -> tuple[float, FloatArray]:
-    """The share of a kind that follows a law of a filter of a series that begins with `first`, by lives that have ended; and
-    the shares of the filter's forms among the kind over those of its prior."""
+    """The share of a kind that follows a law of the filter of a series that begins with `first`, estimated from its
+    ended lives, and the forms' shares in the kind over those in the filter's prior [f]."""
     prior = np.exp(log_form_weight(weak(first, falling=True)))
     by_law = np.bincount(FORM_COURSE, weights=prior * LEAST_DISCREPANCY)
     taught = np.sum([life.laws for life in lives], axis=0)
@@ -312,9 +313,9 @@ def _forms(first: Measurement, lives: Sequence[ObservedLife]) -> tuple[float, Fl
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Decline:
-    """A clutch's tests in the coordinates in which both its scatter and δ are independent from number to number: `damage`
-    [n], `features` [n, p] (x and the steps, for deviations of 1), `turn` [n, n] that leads there, and δ's variances `walk`
-    [n] for q = 1 at the `span`; and their `progress` [n]. `sizes` [p] is how far each feature moves the crossing."""
+    """A clutch's tests rotated to coordinates in which its scatter and δ are independent: `damage` [n], `features`
+    [n, p] (x and the steps, for deviations of 1), `turn` [n, n], the rotation, and δ's variances `walk` [n] for q = 1
+    at the `span`; and their `progress` [n]. `sizes` [p] is how far each feature moves the crossing."""
 
     progress: FloatArray
     span: float
@@ -351,7 +352,7 @@ class _Decline:
         )
 
     def nodes(self, log_end: FloatArray, courses: FloatArray) -> "_Nodes":
-        """The evidence of the tests for courses [j, e, n] of ends [e]."""
+        """Evidence and conditional posterior moments of the tests for courses [j, e, n] at ends [e]."""
         size = np.repeat(criteria.COURSE_DISCREPANCIES, criteria.COURSE_SCATTERS.size)
         scatter = np.tile(criteria.COURSE_SCATTERS, criteria.COURSE_DISCREPANCIES.size)
         size = size * ((self.span * np.exp(-log_end)) ** 1.5)[:, None]
@@ -381,9 +382,9 @@ class _Decline:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Nodes:
-    """By end, pair of deviations (of δ, of the scatter) and course: the log evidence, the mean and the variance of a, each
-    [e, k, j], and the mean of the features [e, k, j, p]; of ends and pairs δ's deviation at the span [e, k] and the weights
-    of the numbers [e, k, n]; the courses [e, n, j]."""
+    """Results at each end, pair of deviations (of δ, of the scatter) and course: the log evidence, the mean and the
+    variance of a, each [e, k, j], and the mean of the features [e, k, j, p]; by end and pair δ's deviation at the span
+    [e, k] and the weights of the numbers [e, k, n]; the courses [e, n, j]."""
 
     log_evidence: FloatArray
     size: FloatArray
@@ -396,9 +397,9 @@ class _Nodes:
     def crossings(
         self, decline: _Decline, log_end: FloatArray, pace: FloatArray, as_of: float, wander: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Where the threshold is crossed, under the nodes that hold nearly all of the evidence: the logarithm of ζ [m], its
-        deviation [m], and the nodes' shares of the evidence [m]. `pace` [j] is that of every course at its
-        end, `wander` [k] the deviation of the logarithm where all is to come."""
+        """Crossings of the threshold under the nodes that hold 99.9 % of the evidence: log ζ [m], its standard
+        deviation [m], and the nodes' shares of the evidence [m]. `pace` [j] is the slope of every course at its end,
+        `wander` [k] the deviation of the logarithm where all of the life is to come."""
         share = np.exp(self.log_evidence - self.log_evidence.max()).ravel()
         order = np.argsort(share)[::-1]
         within = np.cumsum(share[order])
@@ -422,13 +423,13 @@ class _Nodes:
 
 
 def _walked(early: FloatArray, late: FloatArray) -> FloatArray:
-    """The covariance of an integrated random walk whose deviation at 1 is 1, at two times, broadcast."""
+    """Covariance, at two times (broadcast), of an integrated random walk whose standard deviation at time 1 is 1."""
     low, high = np.minimum(early, late), np.maximum(early, late)
     return np.asarray(0.5 * low**2 * (3.0 * high - low))
 
 
 def _plain_courses(share: FloatArray) -> FloatArray:
-    """Courses beside those of ended lives, at shares of life [e, n]: slowing down, straight, steepening; [3, e, n]."""
+    """The three plain courses [3, e, n] at shares of life [e, n]: slowing down, straight, steepening."""
     return np.stack([np.log1p(share / _BEND) / math.log1p(1.0 / _BEND), share, np.minimum(share, 2.0) ** 3])
 
 
@@ -439,7 +440,7 @@ _PLAIN_PACES = (1.0 / ((1.0 + _BEND) * math.log1p(1.0 / _BEND)), 1.0, 3.0)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Predictive:
-    """Student's t of the next value; with `beyond`, values [c] of which it is known only that they are greater.
+    """Student's t predictive density of the next value; with `beyond`, lower bounds [c] of censored values.
 
     Given the others the mean is normal with `precision` in units of the variance, the variance inverse gamma.
     """
@@ -461,7 +462,8 @@ class _Predictive:
         return np.asarray(height - 0.5 * (freedom + 1.0) * np.log1p(deviations**2 / freedom))
 
     def _averaged(self, values: FloatArray, nodes: int = 16) -> FloatArray:
-        """Over means and deviations, evenly by their probability, each weighted by what lies beyond."""
+        """Log predictive density [n] by quadrature over the mean and deviation at equal-probability nodes, each
+        weighted by the likelihood of the censored values `beyond`."""
         even = (np.arange(nodes) + 0.5) / nodes
         deviation = np.repeat(np.sqrt(self.rate / gammaincinv(self.shape, even)), nodes)
         mean = self.mean + deviation / math.sqrt(self.precision) * np.tile(ndtri(even), nodes)
@@ -478,8 +480,9 @@ def _predictive(
     mean_sd: float,
     variance_prior: tuple[float, float],
 ) -> _Predictive:
-    """Of values [n] that are normal with unknown mean and variance. A priori the mean is normal about 0, its deviation
-    `mean_sd` of the values' own, and the variance inverse gamma with (shape, rate) `variance_prior`.
+    """The predictive of a further value given values [n] that are normal with unknown mean and variance. A priori the
+    mean is normal about 0, its deviation `mean_sd` of the values' own, and the variance inverse gamma with (shape,
+    rate) `variance_prior`.
 
     A value is known with a variance [n] of its own, or where it is not `exact` [n], only as a lower bound.
     """
@@ -497,7 +500,8 @@ def _predictive(
 
 
 def severity_exponent(ends: FloatArray, work: FloatArray) -> tuple[float, float]:
-    """The exponent q of lives that end after work^-q cycles, of ends [n] and their cycles' work [n] > 0, and its deviation.
+    """Estimate of the exponent q of lives that end after work^-q cycles, and its standard deviation, from ends [n] and
+    their cycles' work [n] > 0.
 
     Least squares of the logarithms. Raises ValueError where fewer than three lives, or all alike, cannot tell it.
     """

@@ -61,8 +61,8 @@ class FirstPassage:
 
 
 def horizon_at(age: float) -> float:
-    """The cycles since new up to which an end is sought of a life that has so many behind it: a life counts engagements, or
-    kilometres, and an end that is nine ages ahead is no nearer than never."""
+    """Horizon [cycles since new] of the search for an end of life at this age: ten times the age, and HORIZON at least.
+    A life counts engagements, or kilometres, and an end that is nine ages ahead is no nearer than never."""
     return max(HORIZON, 10.0 * age)
 
 
@@ -110,7 +110,7 @@ def predict_first_passage(
 def ends_of_life(
     posterior: TrackPosterior, fraction: float, *, offset: Offset | None = None, horizon: float = HORIZON
 ) -> FloatArray:
-    """The ζ [n] at which each draw first has ξ(ζ) <= fraction · ξ0; inf where it never has. A draw whose rate grows without
+    """First ζ [n] at which each draw has ξ(ζ) <= fraction · ξ0; inf where it never has. A draw whose rate grows without
     bounds has passed every threshold there.
 
     Of a draw that has a discrepancy, or with an offset, only passages up to the horizon are computed.
@@ -133,9 +133,9 @@ def ends_of_life(
 def widened(
     passages: FloatArray, weight: FloatArray, *, as_of: float, horizon: float, powers: tuple[float, float]
 ) -> FloatArray:
-    """Passages [n] whose remaining life is raised as a multiple of its median, or of the horizon where the median lies
-    beyond it: by the first of two powers >= 1 before the median, by the second after it. A life that has ended, more likely
-    than not, stays as it is."""
+    """Passages [n] with remaining life raised, as a multiple of its median (or of the horizon where the median lies
+    beyond it), to the first of two powers >= 1 before the median and the second after it. A life that has ended, more
+    likely than not, is unchanged."""
     remaining = passages - as_of
     middle = float(weighted_quantiles(np.minimum(remaining, horizon - as_of), weight, (0.5,))[0])
     if powers == (1.0, 1.0) or middle <= 0.0:
@@ -147,19 +147,20 @@ def widened(
 
 
 def paths(posterior: TrackPosterior, progress: FloatArray, offset: Offset | None = None) -> FloatArray:
-    """ξ(ζ) + offset(ζ) of the clutch at progress [k] of every draw; [k, n]."""
+    """Paths ξ(ζ) + offset(ζ) [k, n] of the clutch at progress [k] of every draw."""
     values = posterior.of_clutch.values(progress)
     return values if offset is None else np.asarray(values + posterior.beside(offset(progress)))
 
 
 def bands(posterior: TrackPosterior, progress: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """The mean of ξ at progress [k], and its quantiles BAND [k, 3]: what a plot of the course shows."""
+    """Mean [k] of ξ at progress [k], and its quantiles BAND [k, 3], for a plot of the course."""
     values = posterior.values(progress)
     return values @ posterior.weight, np.array([weighted_quantiles(row, posterior.weight, BAND) for row in values])
 
 
 def _along_paths(posterior: TrackPosterior, fraction: float, offset: Offset | None, horizon: float) -> FloatArray:
-    """First passages [n], linear between places; a step of the level or of the offset is a crossing where it is.
+    """First passages [n], by linear interpolation between places; a step of the level or of the offset is a crossing
+    where it is.
 
     The draws' paths are taken at every `_STRIDE`-th place and about the steps, and then at the places between the two of
     these that a draw's passage lies between. An offset may dip anywhere: beside one all places are taken.
@@ -183,7 +184,7 @@ def _along_paths(posterior: TrackPosterior, fraction: float, offset: Offset | No
 
 
 def _places(beside: CourseDiscrepancy | None, horizon: float) -> tuple[FloatArray, NDArray[np.intp]]:
-    """Ascending progress at which paths are looked at, and which of it are the steps after the first place."""
+    """Ascending progress at which paths are evaluated, and the indices in it of the steps after the first place."""
     span = 1.0 if beside is None else beside.span
     at = np.zeros(0) if beside is None else beside.at[(beside.at > 0.0) & (beside.at <= horizon)]
     end = min(span, horizon)
@@ -192,13 +193,14 @@ def _places(beside: CourseDiscrepancy | None, horizon: float) -> tuple[FloatArra
 
 
 def path_places(now: float, horizon: float, behind: int, ahead: int) -> FloatArray:
-    """ζ [behind + ahead - 1] at which paths are computed: evenly from 0 to `now` > 0, and in equal ratios to `horizon`."""
+    """Progress ζ [behind + ahead - 1] at which paths are evaluated: evenly from 0 to `now` > 0, and in equal ratios to
+    `horizon`."""
     return np.concatenate([np.linspace(0.0, now, behind), np.geomspace(now, horizon, ahead)[1:]])
 
 
 def first_below(paths: FloatArray, progress: FloatArray, level: FloatArray) -> FloatArray:
-    """The ζ [n] at which each path [k, n] over ascending progress [k] or [k, n] first comes down to its level [n], linear
-    between places; inf where it never does."""
+    """First ζ [n] at which each path [k, n] over ascending progress [k] or [k, n] falls to its level [n], by linear
+    interpolation between places; inf where it never does."""
     below = paths <= level
     first = below.argmax(axis=0)
     before = np.maximum(first - 1, 0)
@@ -212,7 +214,8 @@ def first_below(paths: FloatArray, progress: FloatArray, level: FloatArray) -> F
 
 
 def weighted_quantiles(sample: FloatArray, weight: FloatArray, quantiles: Sequence[float]) -> FloatArray:
-    """Quantiles of a finite sample [n] with weights [n] >= 0, linear between the middles of the draws' shares."""
+    """Quantiles of a finite sample [n] with weights [n] >= 0, by linear interpolation between the middles of the draws'
+    shares."""
     order = np.argsort(sample, kind="stable")
     share = weight[order] / weight.sum()
     return np.asarray(np.interp(quantiles, np.cumsum(share) - 0.5 * share, sample[order]))
@@ -230,7 +233,8 @@ def _status(end_of_life: dict[float, float | None], passed: float) -> PassageSta
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Limit:
-    """Exactly one of: `fraction` of the initial value, a value `below` or `above` which the quantity may not get.
+    """A limit of a quantity, exactly one of: `fraction` of the initial value, a value `below` or `above` which the
+    quantity may not get.
 
     Raises ValueError where none or several are given, or one is not finite, or fraction lies outside (0, 1).
     """
@@ -254,7 +258,7 @@ class Limit:
         return np.full(np.shape(initial), fixed)
 
     def passages(self, paths: FloatArray, progress: FloatArray) -> FloatArray:
-        """The ζ [n] at which each path [k, n] over ascending progress [k] first comes to the limit; inf where it never does.
+        """First ζ [n] at which each path [k, n] over ascending progress [k] reaches the limit; inf where it never does.
 
         A path that begins past its limit counts only after it has come back to the good side. One that never comes back is
         at the limit from the first ζ.
@@ -266,7 +270,8 @@ class Limit:
 
 
 def places(now: float, horizon: float, behind: int = 40, ahead: int = 200) -> FloatArray:
-    """ζ [k] at which paths are computed: evenly up to `now` >= 0, where a life stands, and in equal ratios to `horizon`."""
+    """Progress ζ [k] at which paths are evaluated: evenly up to `now` >= 0, the present age, and in equal ratios to
+    `horizon`."""
     start = max(now, 1.0)
     return path_places(start, max(horizon, 2.0 * start), behind, ahead)
 
@@ -274,7 +279,7 @@ def places(now: float, horizon: float, behind: int = 40, ahead: int = 200) -> Fl
 def first_reached(
     ends: Sequence[tuple[FloatArray, FloatArray]], size: int, rng: np.random.Generator
 ) -> tuple[FloatArray, FloatArray]:
-    """The first of several ends, `size` draws of equal weight, and the probability [c] of each to be that first.
+    """The earliest of several ends, `size` draws of equal weight, and the probability [c] of each to be the earliest.
 
     `ends` are weighted samples, each of ends [n] (inf: never) with weights [n] that sum to one. A draw in which none is
     ever reached counts for none. At least one is needed. Given its own tests the error of one quantity's end is taken to be

@@ -62,7 +62,8 @@ class FleetPrior:
         return replace(self, mean=self.mean - np.array([0.0, math.log(cycles), 0.0, 0.0]))
 
     def prior_for(self, first: Measurement) -> TrackPrior:
-        """The normal nearest to the population, half as wide again, for a filter of a series that begins with `first`."""
+        """The normal prior with the population's moments, half as wide again, for a filter of a series that begins with
+        `first`."""
         believed = weak(first, falling=True)
         size = believed.size
         # a clutch at the edge of its fleet must not lie at the edge of what the filter covers
@@ -90,7 +91,8 @@ class FleetPrior:
         return np.asarray(constant - np.log(np.diag(root)).sum() - 0.5 * (f + d) * np.log1p(distance / f))
 
     def together(self, under_weak: TrackPosterior, under_fleet: TrackPosterior, first: Measurement) -> TrackPosterior:
-        """Samples of the posterior under `weak` and under `prior_for`, as one of the posterior under the mixture."""
+        """One weighted sample of the posterior under the mixture prior, from samples of the posteriors under `weak` and
+        under `prior_for`."""
         ours, theirs = weak(first, falling=True), self.prior_for(first)
         under_weak, under_fleet = _possible(under_weak, ours), _possible(under_fleet, theirs)
         drawn = pooled(under_weak, under_fleet)
@@ -107,7 +109,7 @@ class FleetPrior:
         return replace(drawn, weight=np.exp(log_weight - np.logaddexp.reduce(log_weight)))
 
     def to_dict(self) -> dict[str, Any]:
-        """As JSON can carry it."""
+        """The population as values that JSON can carry."""
         return asdict(self) | {"mean": self.mean.tolist(), "scale": self.scale.tolist()}
 
     @classmethod
@@ -119,14 +121,16 @@ class FleetPrior:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Taught:
-    """What one clutch says about x: a sample [n, 4] of its posterior, with the weak prior divided out of the weights."""
+    """One clutch's likelihood of x, as a posterior sample [n, 4] with the weak prior divided out of its log weights
+    [n]."""
 
     x: FloatArray
     log_weight: FloatArray
 
 
 def taught(history: Sequence[Measurement], seed: int = 0) -> Taught:
-    """What a clutch's measurements of mean COF say about x. Raises ValueError below FEWEST_TESTS_TO_LEARN of them."""
+    """One clutch's likelihood of x as a weighted sample, from its measurements of mean COF. Raises ValueError below
+    FEWEST_TESTS_TO_LEARN of them."""
     if len(history) < criteria.FEWEST_TESTS_TO_LEARN:
         raise ValueError(
             f"a clutch needs {criteria.FEWEST_TESTS_TO_LEARN} tests to teach a fleet's prior, got {len(history)}"
@@ -140,7 +144,8 @@ def taught(history: Sequence[Measurement], seed: int = 0) -> Taught:
 
 
 def population(fleet: Sequence[Taught], rounds: int = 40) -> FleetPrior:
-    """The population behind the samples of clutches, after so many rounds. Raises ValueError where there are none."""
+    """The population of x learned from the clutches' samples by `rounds` of expectation-maximisation. Raises ValueError
+    without samples."""
     if not fleet:
         raise ValueError(f"a fleet needs a clutch with {criteria.FEWEST_TESTS_TO_LEARN} tests or more")
     centre = weak(Measurement(progress=0.0, value=1.0, variance=0.0), falling=True)
@@ -157,13 +162,15 @@ def population(fleet: Sequence[Taught], rounds: int = 40) -> FleetPrior:
 
 
 def pooled(first: TrackPosterior, second: TrackPosterior) -> TrackPosterior:
-    """The draws of both, each with half of the weight; discrepancies must be of the same history."""
+    """One sample with the draws of both, each sample with half of the weight; discrepancies must be of the same
+    history."""
     both = joined((first, second))
     return replace(both, weight=0.5 * both.weight)
 
 
 def _learnt(population: FleetPrior, fleet: Sequence[Taught], believed: FloatArray) -> FleetPrior:
-    """One round: the clutches' moments given the population, then the population given their moments."""
+    """The population after one round of expectation-maximisation: the clutches' moments given the population, then the
+    population given their moments."""
     n, d = len(fleet), believed.size
     means, spread = np.zeros((n, d)), np.zeros((d, d))
     for index, clutch in enumerate(fleet):
@@ -188,13 +195,13 @@ def _learnt(population: FleetPrior, fleet: Sequence[Taught], believed: FloatArra
 
 
 def _coordinates(drawn: TrackPosterior) -> FloatArray:
-    """x [n, 4] of a sample."""
+    """Coordinates x [n, 4] of a sample, (Δ/ξ0, log φ, log ε, log s/ξ0)."""
     log_scatter = np.log(drawn.scatter / np.abs(drawn.initial))
     return np.stack([drawn.change / drawn.initial, drawn.log_scale, drawn.log_exponent, log_scatter], axis=1)
 
 
 def _log_prior(drawn: TrackPosterior, prior: TrackPrior) -> FloatArray:
-    """Log density of (Δ, log φ, log ε, log s) [n] under a prior; ξ0 has the same under all."""
+    """Log density [n] of (Δ, log φ, log ε, log s) under a prior; ξ0, whose prior is always the same, is left out."""
     spread = math.log(prior.change_sd * prior.log_scale_sd * prior.log_exponent_sd * prior.log_scatter_sd)
     off = (drawn.change * UNIT_OF_CHANGE[drawn.course] - prior.change_mean) / prior.change_sd
     log_other_parts = prior.log_density(drawn.log_scale, drawn.log_exponent, np.log(drawn.scatter))
@@ -206,7 +213,7 @@ def _log_prior(drawn: TrackPosterior, prior: TrackPrior) -> FloatArray:
 
 
 def _on_the_grid_of(prior: TrackPrior, drawn: TrackPosterior) -> NDArray[np.bool_]:
-    """Which draws [n] lie where the exact filter under a prior has its grid: within REACH deviations of the prior's means.
+    """Whether each draw [n] lies on the exact filter's grid under a prior, within REACH deviations of its means.
 
     Only those can be in the samples of both priors, as Bennett's ratio of their evidences needs.
     """
@@ -220,8 +227,8 @@ def _on_the_grid_of(prior: TrackPrior, drawn: TrackPosterior) -> NDArray[np.bool
 
 
 def _possible(drawn: TrackPosterior, prior: TrackPrior) -> TrackPosterior:
-    """A sample under a prior without the draws whose Δ lies beyond the prior's range, if there are others: the normals of an
-    unscented filter reach there, and one draw divided by a density that vanishes would have all of the weight."""
+    """A sample under a prior without the draws whose Δ lies beyond the prior's range, unless all do: an unscented
+    filter's normals reach there, and one draw divided by a density that vanishes would have all of the weight."""
     off = (drawn.change * UNIT_OF_CHANGE[drawn.course] - prior.change_mean) / prior.change_sd
     weight = np.where(np.abs(off) <= REACH, drawn.weight, 0.0)
     return replace(drawn, weight=weight / weight.sum()) if weight.any() else drawn

@@ -24,7 +24,8 @@ from models.arrays import FloatArray
 
 
 def crps_of_quantiles(levels: Sequence[float], quantiles: Sequence[float], truth: float) -> float:
-    """Twice the pinball loss, integrated over the levels: CRPS of a distribution known by its quantiles.
+    """Continuous ranked probability score (CRPS) of a distribution known by its quantiles: twice the pinball loss,
+    integrated over the levels.
 
     Each quantile stands for the levels that are nearer to it than to any other, the outermost for all up to 0 and 1.
     Levels ascend within (0, 1), quantiles ascend. A prediction that is certain has CRPS |x - truth| whatever the levels.
@@ -45,7 +46,8 @@ def covered(low: float | None, high: float | None, truth: float | None) -> bool:
 
 
 def pit_of_quantiles(levels: Sequence[float], quantiles: Sequence[float], truth: float) -> float:
-    """The level of the truth, linear between quantiles; outside of them, the middle of the remaining probability."""
+    """Probability integral transform (PIT): the level of the truth, linear between quantiles; outside of them, the
+    middle of the remaining probability."""
     x = np.asarray(quantiles, dtype=np.float64)
     if truth < x[0]:
         return 0.5 * levels[0]
@@ -70,7 +72,7 @@ def alpha_lambda(predicted: float | None, at: float, end: float, alpha: float = 
 def prognostic_horizon(
     at: Sequence[float], predicted: Sequence[float | None], end: float, alpha: float = 0.1
 ) -> float | None:
-    """The remaining life at the first prediction from which on all are within ±alpha · end of the true remaining life.
+    """Remaining life at the first prediction from which on all are within ±alpha · end of the true remaining life.
 
     `predicted` are remaining lives at ascending progress `at` <= end. None where not even the last one is.
     """
@@ -83,8 +85,8 @@ def prognostic_horizon(
 
 
 def measured_end(progress: FloatArray, values: FloatArray, threshold: float) -> float | None:
-    """Where straight lines between values [n] at ascending progress [n] first pass the threshold; None where they never do,
-    or begin below it."""
+    """First ζ at which straight lines between values [n] at ascending progress [n] pass the threshold; None where they
+    never do, or begin below it."""
     below = np.flatnonzero(values <= threshold)
     if below.size == 0 or below[0] == 0:
         return None

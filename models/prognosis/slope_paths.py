@@ -38,7 +38,7 @@ def draw_jointly(
     size: int,
     rng: np.random.Generator,
 ) -> list[TrackPosterior]:
-    """`size` equal draws of each of q quantities, row by row together, from their own tracks.
+    """`size` joint draws of equal weight of each of q quantities, row by row together, from their own tracks.
 
     `progress` [t] >= 0 and `values` [t, q] with `covariance` [t, q, q], positive definite: that of the fit and the scatter
     between tests. `own` are the quantities' own samples: of these only φ and ε are used.
@@ -80,7 +80,7 @@ def draw_jointly(
 def _merged(
     progress: FloatArray, values: FloatArray, precision: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Progress [t], values [t, q] and precisions [t, q, q] with tests of one bin as one: the bins of `merged_tests`."""
+    """Progress [t], values [t, q] and precisions [t, q, q] with the tests of each bin of `merged_tests` merged."""
     order = np.argsort(progress, kind="stable")
     first = np.unique(bins_of(progress[order]), return_index=True)[1]
     count = np.diff(np.append(first, progress.size))
@@ -91,7 +91,8 @@ def _merged(
 
 
 def _solved(b: FloatArray, values: FloatArray, weight: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Of (ξ0 [q], Δ [q]) given b [t, q, n]: mean [n, 2q], Cholesky root of the precision [n, 2q, 2q], log evidence [n]."""
+    """Joint posterior of (ξ0 [q], Δ [q]) given b [t, q, n]: mean [n, 2q], Cholesky root of the precision [n, 2q, 2q],
+    log evidence [n]."""
     q, n = values.shape[1], b.shape[2]
     around = values[0]
     precision = np.empty((n, 2 * q, 2 * q))
@@ -152,7 +153,7 @@ def _parameter_draws(level: PressureLevel, rng: np.random.Generator) -> list[Tra
 
 
 def _averaged(covariance: FloatArray) -> FloatArray:
-    """Covariances [t, q, q], each the mean of those of its own and the neighbouring tests."""
+    """Covariances [t, q, q] of the tests, each averaged with those of up to _BESIDE tests on either side."""
     if len(covariance) > UNMERGED:
         beyond = [covariance[:_BESIDE][::-1], covariance, covariance[-_BESIDE:][::-1]]
         return np.asarray(sliding_window_view(np.concatenate(beyond), 2 * _BESIDE + 1, axis=0).mean(axis=-1))
@@ -161,7 +162,7 @@ def _averaged(covariance: FloatArray) -> FloatArray:
 
 
 def slope_paths(level: PressureLevel, velocity: float, progress: FloatArray, rng: np.random.Generator) -> FloatArray:
-    """dμ/dv [s/m] at velocity > 0 [m/s] and progress ζ [k] >= 0 of n equal draws; [k, n].
+    """Slope dμ/dv [k, n] s/m at velocity > 0 [m/s] and progress ζ [k] >= 0 of n equal draws.
 
     The slope's own course is no eq. 6: it rises a little, passes through 0 and falls steeply, so that a track of the fitted
     slopes alone sees shudder far too late. `level` holds at least FEWEST_TESTS tests at different progress. Raises

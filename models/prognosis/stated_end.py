@@ -37,9 +37,9 @@ _GRID, _DRAWS = Grid(nodes=13, rows=13, levels=7), 500
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LateStart:
-    """That a clutch was new at its first test, at ζ = `begun`: the log odds of it by the tests alone, and if so its ends of
-    life ζ [n] with weights [n] that sum to one, the forms of these draws [n] (`courses`) and the mean of its value when new.
-    """
+    """The alternative that a clutch was new at its first test, at ζ = `begun`: its log odds by the tests alone, and the
+    ends of life ζ [n] under it with weights [n] that sum to one, the forms of these draws [n] (`courses`) and the mean
+    of its value when new."""
 
     begun: float
     log_odds: float
@@ -49,8 +49,9 @@ class LateStart:
     initial: float
 
     def weighed(self, own: FloatArray, weight: FloatArray) -> tuple[float, FloatArray]:
-        """Its probability, and the weights of a filter's `own` ends [n] where the clutch was alive at its first test, from
-        weights [n] that sum to one: both sum to one together."""
+        """Probability of the alternative, and the weights of a filter's `own` ends [n] under the other one, from
+        weights [n] that sum to one: ends before the first test have weight 0, and probability and weights sum to one
+        together."""
         alive = np.where(own > self.begun, weight, 0.0)
         share = float(alive.sum())
         if share == 0.0:
@@ -71,8 +72,8 @@ def late_start(
     horizon: float,
     priors: WeightedPriors = (),
 ) -> LateStart | None:
-    """Of a clutch by its tests and the priors in force (none: the weak one); its end is where ξ + offset first is at a
-    fraction of that when new. `offset` gives [1, k].
+    """The alternative that a clutch was new at its first test, by its tests and the priors in force (none: the weak
+    one); its end is where ξ + offset first falls to a fraction of that when new. `offset` gives [1, k].
 
     None where the first test came within the share LATE_START of what was measured, for where it was new is then much the
     same; and of fewer than FEWEST_TESTS tests at different ζ.
@@ -95,7 +96,8 @@ def late_start(
 
 @lru_cache(maxsize=8)
 def _weighed(tests: tuple[Measurement, ...], begun: float, priors: WeightedPriors) -> tuple[float, TrackPosterior]:
-    """The log odds that the clutch was new at its first test, and draws if it was; kept for the next filter."""
+    """Log odds that the clutch was new at its first test, and draws under that alternative; cached for the next
+    filter."""
     priors = priors or ((1.0, weak(min(tests, key=lambda test: test.progress), falling=True)),)
     since = [replace(test, progress=test.progress - begun) for test in tests]
     log_whole, log_later, parts = [], [], []
@@ -117,8 +119,8 @@ def _weighed(tests: tuple[Measurement, ...], begun: float, priors: WeightedPrior
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NewLater:
-    """How probably a clutch whose first test is late was new there; the mean of its value when new, and of that at ζ = 0,
-    where the filter has it new."""
+    """Probability that a clutch whose first test is late was new there; the mean of its value when new, and of that at
+    ζ = 0, where the filter has it new."""
 
     probability: float
     initial: float
@@ -127,8 +129,8 @@ class NewLater:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StatedEnd:
-    """A sample of ζ at the end of life [n], inf beyond the horizon, its weights [n], and by how many ended `lives`; of a
-    clutch that is first tested `late`, when it was new."""
+    """The end of life as stated: a sample of ζ [n], inf beyond the horizon, its weights [n], and the number of ended
+    `lives` used; `late` is set if the first test came late."""
 
     ends: FloatArray
     weight: FloatArray
@@ -148,7 +150,7 @@ def stated_end(
     tests: Sequence[Measurement] = (),
     priors: WeightedPriors = (),
 ) -> StatedEnd:
-    """The end of a life that is at ζ = `as_of`, as `posterior` has it, its remaining part `widened` by `powers`.
+    """The end of a life that is at ζ = `as_of`, from `posterior`, its remaining part `widened` by `powers`.
 
     By its `tests`, under the `priors` in force, it may have been new at the first of them; and what lies ahead of it is that
     of a clutch like the `ended` ones, with the probability that it is of their kind. What is behind, and a life that is over
@@ -181,6 +183,6 @@ def stated_end(
 
 
 def _mean(posterior: TrackPosterior, offsets: FloatArray) -> FloatArray:
-    """What an offset adds [b, k], in the mean over the branches [1, k]."""
+    """Offset [1, k] averaged over the branches by their weights, from offsets by branch [b, k]."""
     at_offsets = posterior.beside(offsets)
     return np.asarray(at_offsets.T if at_offsets.shape[1] == 1 else (at_offsets @ posterior.weight)[None])

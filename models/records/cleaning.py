@@ -23,7 +23,7 @@ _CHANNELS = ("pressure", "speed", "torque", "oil_temperature", "plate_temperatur
 
 
 class Sampled(Protocol):
-    """What a `Record` holds, in SI units; a channel may be computed again at each access."""
+    """The channels of a `Record`, in SI units; a channel may be computed again at each access."""
 
     @property
     def time(self) -> FloatArray: ...
@@ -41,19 +41,20 @@ class Sampled(Protocol):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Cleaning:
-    """What is kept of a record: `rows` in order of time (None: all, unchanged), its sampling period [s], notes."""
+    """The plan of a record's cleaning: `rows` to keep, in order of time (None: all, unchanged), its sampling period
+    [s], notes."""
 
     rows: NDArray[np.intp] | None
     period: float
     notes: tuple[Note, ...]
 
     def of(self, channel: FloatArray) -> FloatArray:
-        """What is kept of a channel."""
+        """The kept samples of a channel."""
         return channel if self.rows is None else channel[self.rows]
 
 
 class UnusableRecordError(ValueError):
-    """A record of which nothing can be said, for its own sake and not for a fault of the code."""
+    """Raised for a record that cannot be evaluated, for a defect of the record and not of the code."""
 
 
 def clean(record: Record) -> tuple[Record, float, tuple[Note, ...]]:
@@ -111,7 +112,7 @@ def _require_measurements(name: str, channel: FloatArray) -> None:
 
 
 def stands(times: FloatArray) -> bool:
-    """Whether a clock [s], [n], is coarser than its rows: more than one in ten of its steps is none."""
+    """Whether a clock [s], [n], is coarser than its rows: more than one in ten of its steps is zero."""
     return bool(np.count_nonzero(times[1:] == times[:-1]) > 0.1 * (times.size - 1))
 
 
@@ -154,8 +155,8 @@ def _in_order(time: FloatArray) -> tuple[NDArray[np.intp] | None, float, list[No
 
 
 def missing_samples(time: FloatArray) -> list[Note]:
-    """The note of samples that are missing from an increasing clock [s], [n], of any kind of record: lost, not stored, or
-    passed over by a clock that was set forwards; no note where none are."""
+    """Note of samples missing from an increasing clock [s], [n], of any kind of record: lost, not stored, or passed
+    over by a clock that was set forwards; empty where none are."""
     steps = np.diff(time)
     if steps.size == 0:
         return []
@@ -164,8 +165,8 @@ def missing_samples(time: FloatArray) -> list[Note]:
 
 
 def _missing(time: FloatArray, period: float) -> tuple[list[Note], bool]:
-    """The note of samples that are missing by their period [s], and whether they are so many in so many places that rows
-    were stored only when a value changed."""
+    """Note of missing samples by their period [s], and whether they are so many in so many places that rows were stored
+    only when a value changed."""
     steps = np.diff(time)
     lost = round((time[-1] - time[0]) / period) + 1 - time.size
     gaps = np.flatnonzero(steps > 1.5 * period)
@@ -210,7 +211,7 @@ def _spikes(channel: FloatArray, longest: int) -> NDArray[np.intp]:
 
 
 def _jumps(channel: FloatArray, most: float) -> NDArray[np.intp]:
-    """Indices of samples from which the next one lies further than `most`, piece by piece."""
+    """Indices of samples whose successor differs by more than `most`, computed piece by piece."""
     jumps = [
         np.flatnonzero(np.abs(np.diff(channel[start : start + SCALE_SAMPLES + 1])) > most) + start
         for start in range(0, channel.size - 1, SCALE_SAMPLES)
@@ -219,5 +220,5 @@ def _jumps(channel: FloatArray, most: float) -> NDArray[np.intp]:
 
 
 def listed(times: FloatArray) -> str:
-    """The first five of times [s], for a note."""
+    """The first five of times [s], as text for a note."""
     return ", ".join(f"{time:.2f}" for time in times[:5]) + (", ..." if len(times) > 5 else "")

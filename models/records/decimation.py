@@ -31,7 +31,7 @@ def extreme_rows(columns: Iterable[FloatArray], count: int, *, samples: int, poi
 
 
 def _equal_bins(column: FloatArray, length: int) -> Iterable[tuple[int, FloatArray]]:
-    """Where they begin, and bins [b, length] of a column; the last, shorter one by itself."""
+    """First rows of the bins, and bins [b, length] of a column; the last, shorter one by itself."""
     whole_length = column.size // length * length
     if whole_length:
         yield 0, column[:whole_length].reshape(-1, length)

@@ -36,7 +36,7 @@ class Blocks:
 
 
 def average(record: Sampled, cleaning: Cleaning) -> Blocks:
-    """Means over blocks of about 10 ms of the kept rows of a record; a remainder at its end is left out."""
+    """Block means, over about 10 ms each, of the kept rows of a record; a remainder at its end is left out."""
     period = cleaning.period
     size = max(1, round(0.01 / period))  # blocks of 10 ms
     time = cleaning.of(record.time)
@@ -72,8 +72,8 @@ def average(record: Sampled, cleaning: Cleaning) -> Blocks:
 
 
 def find_dwells(blocks: Blocks) -> tuple[list[slice], list[Note]]:
-    """The dwells, slices of blocks on one level, in motion, and under pressure where there is any, in the order of time; and
-    notes on those left out."""
+    """The dwells, slices of blocks on one level, in motion, and under pressure where there is any, in the order of
+    time; and notes on dwells left out."""
     if blocks.time.size < criteria.SHORTEST_DWELL:
         return [], []
     window = max(4, round(0.2 / blocks.duration))  # 0.2 s before and after, four blocks at least
@@ -95,14 +95,15 @@ def find_dwells(blocks: Blocks) -> tuple[list[slice], list[Note]]:
 
 
 def _highest(pressure: FloatArray, window: int) -> float:
-    """The 99.5 % quantile [Pa] of means over a window of blocks: a gauge's noise and its negative offset are no pressure."""
+    """Highest pressure [Pa], as the 99.5 % quantile of means over a window of blocks: a gauge's noise and its negative
+    offset are no pressure."""
     size = min(window, pressure.size)
     total = np.concatenate([[0.0], np.cumsum(pressure)])
     return float(np.quantile((total[size:] - total[:-size]) / size, 0.995))
 
 
 class _Channel:
-    """Speed or pressure [m], and where it is steady."""
+    """The speed or pressure channel [m], and whether it is steady at each block."""
 
     def __init__(self, values: FloatArray, window: int) -> None:
         self.values = values
@@ -113,7 +114,8 @@ class _Channel:
         self._levels: dict[tuple[int, int], tuple[float, float]] = {}
 
     def judge(self, active: NDArray[np.bool_]) -> None:
-        """Steady where the windows after and before agree; the record's ends are as the blocks next to them."""
+        """Marks the blocks as steady at which the windows after and before agree; the record's ends are as the blocks
+        next to them."""
         size = self.values.size
         window = min(self.window, size // 2)
         total = np.concatenate([[0.0], np.cumsum(self.values - self.values.mean())])
@@ -129,7 +131,7 @@ class _Channel:
         self.steady = curvature <= self.threshold
 
     def level(self, core: tuple[int, int]) -> tuple[float, float]:
-        """The level of a core and how far a block may lie off it; only after `judge`."""
+        """Level of a core, and the tolerance within which blocks lie on it; only after `judge`."""
         if core not in self._levels:
             part = self.values[slice(*core)]
             self._levels[core] = (
@@ -140,7 +142,7 @@ class _Channel:
 
 
 def _merged(cores: list[tuple[int, int]], blocks: Blocks, channels: tuple[_Channel, ...]) -> list[tuple[int, int]]:
-    """Neighbours on the same level, with nothing that leaves it between them, are one."""
+    """Cores with neighbours on the same level merged, where no block between them leaves the level."""
     merged: list[tuple[int, int]] = []
     for core in cores:
         if merged and not blocks.gap[merged[-1][1] : core[0]].any():
@@ -159,7 +161,7 @@ def _merged(cores: list[tuple[int, int]], blocks: Blocks, channels: tuple[_Chann
 
 
 def _widened(cores: list[tuple[int, int]], blocks: Blocks, channels: tuple[_Channel, ...]) -> list[slice]:
-    """Up to where a channel begins to leave the level, or samples are missing."""
+    """Cores widened to where a channel begins to leave the level, or samples are missing."""
     dwells = []
     for row, (start, stop) in enumerate(cores):
         first = cores[row - 1][1] if row else 0
@@ -175,7 +177,7 @@ def _widened(cores: list[tuple[int, int]], blocks: Blocks, channels: tuple[_Chan
 
 
 def _reach(off: FloatArray, tolerance: float) -> int:
-    """How many blocks lie on the level: a ramp takes as long to the tolerance as from there to twice that."""
+    """Number of blocks on the level: a ramp takes as long to the tolerance as from there to twice that."""
     out = np.flatnonzero(off > tolerance)
     if out.size == 0:
         return off.size
@@ -186,7 +188,8 @@ def _reach(off: FloatArray, tolerance: float) -> int:
 def _sorted_out(
     dwells: list[slice], blocks: Blocks, channels: tuple[_Channel, ...], least: float
 ) -> tuple[list[slice], list[Note]]:
-    """The dwells that give a mean; the last of `channels` is speed, `least` [Pa] the pressure below which there is none."""
+    """The dwells from which a mean is computed, and notes on the others; the last of `channels` is speed, `least` [Pa]
+    the pressure below which there is none."""
     kept: list[slice] = []
     speed = channels[-1]
     left: dict[str, list[float]] = {code: [] for code in _SENTENCES}

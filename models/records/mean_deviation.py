@@ -24,7 +24,8 @@ from models.records import criteria
 
 
 def slow_correlation(residuals: Sequence[FloatArray], most: int = 64) -> FloatArray:
-    """ρ at lags 1, 2, ... up to the longest of residuals, each [m] free of mean and trend and of one clock.
+    """Autocorrelation ρ at lags 1, 2, ... by restricted likelihood of a white and a slow noise, up to the longest of
+    residuals, each [m] free of mean and trend and of one clock.
 
     At `most` so many averages of each are used. Empty where none of them has as many as eight.
     """
@@ -59,7 +60,7 @@ def slow_correlation(residuals: Sequence[FloatArray], most: int = 64) -> FloatAr
 
 
 def _averaged(time: float, group: int, size: int) -> FloatArray:
-    """Covariances [size] of means over `group` of slow noise of variance 1 and correlation time `time`."""
+    """Covariances [size] of averages over `group` values of slow noise with variance 1 and correlation time `time`."""
     inner = np.arange(1, group)
     within = (1 + 2 * float(((1 - inner / group) * np.exp(-inner / time)).sum())) / group
     step = np.exp(-np.arange(group) / time).mean() * np.exp(np.arange(group) / time).mean()
@@ -69,9 +70,9 @@ def _averaged(time: float, group: int, size: int) -> FloatArray:
 def _restricted(
     table: FloatArray, size: NDArray[np.intp], slow: FloatArray, share: float
 ) -> tuple[float, float, float]:
-    """The restricted log likelihood of columns of `table` [N, d], each of its own size [d], under `share` of `slow` noise
-    [N] and a rest that is white; what both are scaled by, and their variance then, on average.
-    """
+    """Restricted log likelihood of the columns of `table` [N, d], each of its own size [d], for noise with a share
+    `share` of slow covariance `slow` [N] and a white rest; the average scale of the covariance, and the variance at
+    that scale."""
     covariance = share * slow
     covariance[0] += 1 - share
     factor = np.linalg.cholesky(toeplitz(covariance) + 1e-9 * np.eye(slow.size))
@@ -105,21 +106,22 @@ class Stretch:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DwellAutocorrelation:
-    """ρ at lags 1, 2, ... [m]; resolved is false where it had not faded at the longest lag that dwells can show: then it is
-    that of `slow_correlation`."""
+    """Autocorrelation ρ of dwells at lags 1, 2, ... [m]; resolved is false where it had not faded at the longest lag
+    that dwells can show: then it is that of `slow_correlation`."""
 
     lags: FloatArray
     resolved: bool = True
 
     def factor(self, count: int) -> float:
-        """The variance of a mean over `count` values over that of as many independent ones."""
+        """Variance inflation of a mean over `count` values: its variance over that of as many independent ones."""
         lag = np.arange(1, self.lags.size + 1)
         # anticorrelated noise averages out faster, but no further than this
         return max(float(1 + 2 * (np.maximum(1 - lag / count, 0.0) * self.lags).sum()), 0.2)
 
 
 def pooled_correlation(residuals: Sequence[FloatArray], removed: int) -> DwellAutocorrelation:
-    """ρ of all residuals together, each of which `removed` coefficients of low frequency were fitted to."""
+    """Autocorrelation ρ of all residuals together, corrected for the `removed` coefficients of low frequency that were
+    fitted to each."""
     length = float(np.median([residual.size for residual in residuals]))
     longest = max(1, min(400, int(criteria.LOST_SHARE * length / (2 * removed))))  # averages
     total, count = np.zeros(longest + 1), np.zeros(longest + 1)
@@ -150,7 +152,8 @@ def pooled_correlation(residuals: Sequence[FloatArray], removed: int) -> DwellAu
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MeanDeviations:
-    """One row a dwell: of its mean [n] Nm, its drift [n] Nm/s, the drift's deviation [n] Nm/s, of an average [n] Nm.
+    """Standard deviations and drifts, one row a dwell: of its mean [n] Nm, its drift [n] Nm/s, the drift's deviation
+    [n] Nm/s, of an average [n] Nm.
 
     resolved is false where noise is autocorrelated over longer times than a dwell: its correlation is then modelled.
     """
@@ -163,7 +166,7 @@ class MeanDeviations:
 
 
 def deviations(stretches: Sequence[Stretch]) -> MeanDeviations:
-    """The deviation of the mean of every stretch."""
+    """Standard deviation of the mean of every stretch, with drifts."""
     slopes, squares, residuals = [], [], []
     for stretch in stretches:
         centred = stretch.time - stretch.time.mean()
@@ -189,7 +192,8 @@ def deviations(stretches: Sequence[Stretch]) -> MeanDeviations:
 
 
 def _moments(residual: FloatArray, correlation: DwellAutocorrelation) -> tuple[float, float, float, float]:
-    """Variance of an average, the factor of its mean, batch means' variance over that by the factor, degrees of freedom."""
+    """Variance of an average, the variance inflation of its mean, the ratio of the batch means' variance to that
+    expected by the inflation, and its degrees of freedom."""
     size = residual.size
     factor = correlation.factor(size)
     variance = float(residual @ residual) / max(size - 2 * factor, 0.5 * size)
@@ -203,7 +207,7 @@ def _moments(residual: FloatArray, correlation: DwellAutocorrelation) -> tuple[f
 
 
 def _moderated(ratio: FloatArray, freedom: FloatArray) -> FloatArray:
-    """Each dwell's own ratio [n], shrunk towards 1 by as much as ratios scatter by chance (G. Smyth 2004)."""
+    """Variance ratios [n] of the dwells, shrunk towards 1 by as much as ratios scatter by chance (G. Smyth 2004)."""
     if ratio.size < 8:
         return np.ones_like(ratio)
     log_ratio = np.log(np.maximum(ratio, 1e-6)) - digamma(freedom / 2) + np.log(freedom / 2)

@@ -31,7 +31,8 @@ _MISS, _OFF = 0.15, 0.2
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Cycle:
-    """A fitted swing: frequency [Hz], origin t_0 [s], mean v_0, cosine and sine [h], in the unit of what was fitted.
+    """A fitted periodic swing: frequency [Hz], origin t_0 [s], mean v_0, cosine and sine [h], in the fitted quantity's
+    unit.
 
     `covariance` [2h, 2h] is that of (cosine, sine) with f free; `noise` the deviation of a sample; the swing begins at
     `begin` [s], its last whole periods are those of start <= t < stop [s]; `outliers` samples were left out.
@@ -52,27 +53,27 @@ class Cycle:
 
     @property
     def amplitude(self) -> float:
-        """Of the first harmonic."""
+        """Amplitude of the first harmonic."""
         return math.hypot(float(self.cosine[0]), float(self.sine[0]))
 
     def phase(self, time: FloatArray) -> FloatArray:
-        """θ [n] rad at time [n] s."""
+        """Phase θ [n] rad at time [n] s."""
         return 2 * math.pi * self.frequency * (time - self.origin)
 
     def value(self, phase: FloatArray) -> FloatArray:
-        """v [n] at phase [n] rad."""
+        """Fitted value v [n] at phase [n] rad."""
         basis = harmonics(phase, self.cosine.size)
         return np.asarray(self.mean + basis @ np.concatenate([self.cosine, self.sine]), dtype=np.float64)
 
     def gradient(self, phase: FloatArray) -> FloatArray:
-        """dv/dθ [n] at phase [n] rad; dv/dt is 2πf times that."""
+        """Derivative dv/dθ [n] at phase [n] rad; dv/dt is 2πf times that."""
         order = np.arange(1, self.cosine.size + 1)
         basis = harmonics(phase, self.cosine.size)
         return np.asarray(basis @ np.concatenate([order * self.sine, -order * self.cosine]), dtype=np.float64)
 
 
 def harmonics(phase: FloatArray, count: int) -> FloatArray:
-    """cos hθ and sin hθ for h = 1 ... count: [n, 2 count], cosines first."""
+    """Design matrix [n, 2 count] of cos hθ and sin hθ for h = 1 ... count, cosines first."""
     turn = np.exp(1j * phase)
     powers = np.empty((phase.size, count), dtype=np.complex128)
     power = np.ones_like(turn)
@@ -83,7 +84,7 @@ def harmonics(phase: FloatArray, count: int) -> FloatArray:
 
 
 def sample_interval(time: FloatArray) -> float:
-    """The usual distance of two samples [s], 0 for a single one."""
+    """The median distance of two samples [s], 0 for a single one."""
     return float(np.median(np.diff(time))) if time.size > 1 else 0.0
 
 
@@ -134,7 +135,8 @@ def _without_ends(time: FloatArray, value: FloatArray, frequency: float, count: 
 
 
 def _with_corners(time: FloatArray, value: FloatArray, cycle: Cycle) -> Cycle:
-    """With more harmonics while they take away much of what is missed: ramps have corners, a sine has none."""
+    """The cycle refitted with more harmonics, as long as these reduce the residual substantially: ramps have corners, a
+    sine has none."""
     step = max(1, time.size // 8000)
     time, value = time[::step], value[::step]
     inside = (time >= cycle.begin) & (time < cycle.stop)
@@ -156,7 +158,8 @@ def _with_corners(time: FloatArray, value: FloatArray, cycle: Cycle) -> Cycle:
 
 
 def _following(time: FloatArray, value: FloatArray, cycle: Cycle) -> slice:
-    """Without the ends that do not follow the swing: holds between two pressures, the way to where the next begins."""
+    """Slice of the samples without the ends that do not follow the swing: holds between two pressures, the way to where
+    the next begins."""
     residual = value - cycle.value(cycle.phase(time))
     usual = 1.4826 * float(np.median(np.abs(residual - np.median(residual))))
     smooth = running_median(residual, criteria.NEIGHBOURS)
@@ -166,7 +169,8 @@ def _following(time: FloatArray, value: FloatArray, cycle: Cycle) -> slice:
 
 
 def _without_rest(time: FloatArray, value: FloatArray, period: float) -> slice:
-    """Without standing still before and after, where that lasts for a swing of this period [s] at most."""
+    """Slice of the samples without standstill before and after, if that is no longer than a swing of this period [s]
+    may rest."""
     smooth = running_median(value, 3)
     swing, noise = float(np.ptp(smooth)), float(np.median(np.abs(value - smooth)))
     least = min(0.02 * swing + 4 * noise, 0.05 * swing)
@@ -190,7 +194,8 @@ def _without_rest(time: FloatArray, value: FloatArray, period: float) -> slice:
 
 
 def _coarse_frequency(time: FloatArray, value: FloatArray) -> float:
-    """The periodogram's highest frequency, then the best sine about it: within a twentieth of 1/duration."""
+    """Coarse frequency [Hz] of the swing, by the periodogram's peak and then the best sine about it: within a twentieth
+    of 1/duration."""
     duration = float(time[-1] - time[0])
     points = int(min(4096, max(64, time.size)))
     grid = np.linspace(0.0, duration, points)
@@ -205,7 +210,7 @@ def _coarse_frequency(time: FloatArray, value: FloatArray) -> float:
 
 
 def _explained(time: FloatArray, value: FloatArray, frequencies: FloatArray) -> FloatArray:
-    """How much of the squares of value [n] a mean and a sine of each frequency [m] Hz explain: [m]."""
+    """Sum of squares of value [n] explained by a mean and a sine of each frequency [m] Hz: [m]."""
     turn = np.exp(2j * math.pi * frequencies[:, np.newaxis] * time)
     once, twice, along = turn.sum(axis=1), (turn**2).sum(axis=1), turn @ value
     gram = np.empty((frequencies.size, 3, 3))
@@ -220,8 +225,8 @@ def _explained(time: FloatArray, value: FloatArray, frequencies: FloatArray) -> 
 
 
 def _refine(time: FloatArray, value: FloatArray, frequency: float, count: int, tolerance: float) -> Cycle | str:
-    """Gauss-Newton on frequency, mean and `count` harmonics until the frequency moves by less than `tolerance`/duration;
-    outliers are determined again in the first steps."""
+    """The swing by Gauss-Newton on frequency, mean and `count` harmonics, iterated until the frequency moves by less
+    than `tolerance`/duration; a sentence where it fails. Outliers are determined again in the first steps."""
     origin, duration = 0.5 * float(time[0] + time[-1]), float(time[-1] - time[0])
     order, highest = np.arange(1, count + 1), 0.5 / max(sample_interval(time), 1e-12)
     keep, steady = np.ones(time.size, dtype=np.bool_), beside(value)

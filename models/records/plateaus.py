@@ -22,7 +22,7 @@ from models.records.torque_filter import filtered
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlateauCut:
-    """Plateaus in the order measured, one row [n] each, and how they were computed.
+    """Plateaus in the order measured, one row [n] each, with their intervals and the notes of the cut.
 
     `plateaus.torque_sd` [n] Nm is the deviation of the mean torque. `count` [n] samples were used; `noise` [n] Nm is the
     deviation of a sample about its dwell; `drift` [n] Nm/s the slope of torque over the samples used, with its deviation
@@ -101,7 +101,8 @@ def cut_plateaus(record: Sampled, torque_filter: float = 0.0) -> PlateauCut:
 
 
 def _filtered(blocks: Blocks, torque_filter: float) -> Blocks:
-    """With pressure and speed as late as torque: means over blocks commute with a filter, and are clean of spikes."""
+    """Block means with pressure and speed delayed like torque: means over blocks commute with a filter, and are clean
+    of spikes."""
     if torque_filter == 0.0:
         return blocks
     pressure, speed = (filtered(blocks.time, channel, torque_filter) for channel in (blocks.pressure, blocks.speed))
@@ -157,7 +158,7 @@ def _mean(channel: FloatArray, dwells: list[slice]) -> FloatArray:
 
 
 def _rounding(torque: FloatArray, noise: FloatArray) -> float:
-    """The error of a mean [Nm] by rounding to counts of q: q/√12 exp(-2π² σ²/q²), σ the noise [n] Nm before rounding."""
+    """Error [Nm] of a mean by rounding to counts of q: q/√12 exp(-2π² σ²/q²), σ the noise [n] Nm before rounding."""
     levels = np.unique(torque[:: max(1, torque.size // SCALE_SAMPLES)])
     if levels.size < 2:
         return 0.0

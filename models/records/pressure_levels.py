@@ -25,7 +25,7 @@ from models.records.periods import sample_interval
 
 
 def level_width(pressure: float) -> float:
-    """How far apart [Pa] pressures of one level may lie at this pressure [Pa]: LEVEL_GAP, or its share if more."""
+    """The largest distance [Pa] of pressures of one level at this pressure [Pa]: LEVEL_GAP, or its share if more."""
     return max(LEVEL_GAP, LEVEL_GAP_SHARE * pressure)
 
 
@@ -52,7 +52,7 @@ def levels_of(pressure: FloatArray) -> FloatArray:
 
 
 def _rounded_level(median: float) -> float:
-    """The roundest pressure that a gauge's error leaves [Pa], or the median itself."""
+    """The roundest pressure [Pa] within a gauge's error of the median, or the median itself."""
     near = max(NAMED_WITHIN, NAMED_WITHIN_SHARE * median)
     for step in LEVEL_NAMES:
         snapped = round(median / step) * step
@@ -92,7 +92,8 @@ def pressure_stretches(time: FloatArray, pressure: FloatArray) -> Iterator[Press
 
 
 def _groups(medians: FloatArray) -> Iterator[tuple[int, int, float]]:
-    """The blocks [first, end) whose medians [b] stay near the median of those before them in the group, and that of all."""
+    """Groups of consecutive blocks [first, end) with their level [Pa]: each median [b] lies within one level's width of
+    the running median of its group."""
     first = 0
     ordered: list[float] = []  # the medians [first, end), ascending
     for end in range(1, medians.size + 1):
@@ -106,8 +107,8 @@ def _groups(medians: FloatArray) -> Iterator[tuple[int, int, float]]:
 def _rows_near(
     level: float, allowed: float, smooth: FloatArray, edges: NDArray[np.intp], first: int, end: int
 ) -> tuple[int, int]:
-    """The rows [start, stop) of the blocks [first, end), without what is off the level in the first and the last block, and
-    with what is near it in the blocks beside them."""
+    """Row range [start, stop) of the blocks [first, end) at a level: rows off the level at the edges of the first and
+    the last block are cut off, adjoining rows near it in the blocks beside them are added."""
     near = np.abs(smooth - level) <= allowed
     lowest, highest = edges[max(first - 1, 0)], edges[min(end + 1, edges.size - 1)]
     inside_start, inside_stop = edges[first + 1], edges[end - 1]
@@ -119,7 +120,7 @@ def _rows_near(
 
 
 def _block_medians(values: FloatArray, block: NDArray[np.int64], edges: NDArray[np.int64]) -> FloatArray:
-    """The median of values [n] in each block [n], ascending, that starts at its edge."""
+    """Median of values [n] in each block; `block` [n] is ascending and starts anew at each edge."""
     ordered = values[np.lexsort((values, block))]
     first, count = edges[:-1], np.diff(edges)
     return np.asarray(0.5 * (ordered[first + (count - 1) // 2] + ordered[first + count // 2]), dtype=np.float64)

@@ -18,7 +18,7 @@ from models.records.pressure_levels import levels_of
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Columns:
-    """Columns of one length, of finite numbers, with one row at least; or ValueError."""
+    """Columns of one length, of finite numbers, with one row at least; other input raises ValueError."""
 
     pressure: FloatArray
     speed: FloatArray
@@ -85,8 +85,8 @@ class Curve:
 
 
 def plate_rise(measured: Plateaus | Record) -> FloatArray | None:
-    """How far the plate is above the oil [n] K; above its own lowest temperature where the oil's was not measured, for then
-    only its changes mean something. None where the plate's was not measured."""
+    """Temperature rise [n] K of the plate above the oil; above its own lowest temperature where the oil's was not
+    measured, for then only its changes mean something. None where the plate's was not measured."""
     plate, oil = measured.plate_temperature, measured.oil_temperature
     if plate is None:
         return None
@@ -94,7 +94,8 @@ def plate_rise(measured: Plateaus | Record) -> FloatArray | None:
 
 
 def loaded(plateaus: Plateaus) -> Plateaus | None:
-    """The plateaus at a pressure of UNLOADED or more, through which curves go; None where the clutch was open on all."""
+    """The plateaus at a pressure of UNLOADED or more, through which curves are fitted; None where the clutch was open
+    on all."""
     rows = plateaus.pressure >= UNLOADED
     if not rows.any():
         return None

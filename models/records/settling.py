@@ -21,9 +21,8 @@ from models.records.mean_deviation import Stretch, pooled_correlation
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Transients:
-    """One row a dwell: time_constant [n] s (nan where no transient is resolved), slowest [n] s its upper limit, amplitude
-    [n] Nm at the dwell's start, amplitude_sd [n] Nm.
-    """
+    """Settling transients, one row a dwell: time_constant [n] s (nan where no transient is resolved), slowest [n] s its
+    upper limit, amplitude [n] Nm at the dwell's start, amplitude_sd [n] Nm."""
 
     time_constant: FloatArray
     slowest: FloatArray
@@ -102,8 +101,8 @@ def _scan(stretch: Stretch, basis: _Basis) -> _Scan:
 def _common(
     worth: FloatArray, gain: FloatArray, place: FloatArray, most_spread: float = 0.5, cap: float = 1e3
 ) -> tuple[float, float] | None:
-    """log τ that explains all dwells [n, J] best, and how far that of one of them lies from it (one deviation); None where
-    no transient does. A dwell counts for `cap` squared deviations at most."""
+    """Common log τ of all dwells [n, J], and the standard deviation of one dwell's log τ about it; None where no
+    transient is visible. A dwell counts for `cap` squared deviations at most."""
     share = np.minimum(cap / np.maximum(worth.max(axis=1), cap), 1.0)
     together = share @ worth
     dwells = worth.shape[0]
@@ -121,7 +120,8 @@ def _common(
 
 
 def _peak(worth: FloatArray, place: FloatArray) -> tuple[float, float]:
-    """Where worth [J], in squared deviations, is highest over place [J], by a parabola; and the deviation of that."""
+    """Position of the maximum of worth [J], in squared deviations, over place [J], by a parabola; and its standard
+    deviation."""
     best, step = int(worth.argmax()), float(place[1] - place[0])
     if not 0 < best < worth.size - 1:
         return float(place[best]), 1.0
@@ -140,7 +140,7 @@ def _fit(
     long_run: float,
     common: tuple[float, float] | None,
 ) -> tuple[float, float, float, float]:
-    """τ, its upper limit, A and its deviation."""
+    """Time constant τ of a dwell's transient, its upper limit, the amplitude A and its standard deviation."""
     if common is None and gain[worth.argmax()] < criteria.OWN_GAIN:
         return np.nan, np.nan, 0.0, 0.0
     penalty = 0.0 if common is None else ((place - common[0]) / common[1]) ** 2
@@ -153,7 +153,8 @@ def _fit(
 
 
 def dropped(transients: Transients, duration: FloatArray, deviation: FloatArray) -> FloatArray:
-    """How much of each dwell to drop [n] s: from then on the transient shifts the mean by < 0.1 of its deviation.
+    """Time [n] s to drop from the start of each dwell: from then on the transient shifts the mean by < 0.1 of its
+    deviation.
 
     duration [n] s of the dwells, deviation [n] Nm of a mean over the whole of each. At most three quarters are dropped.
     """
@@ -169,5 +170,5 @@ def dropped(transients: Transients, duration: FloatArray, deviation: FloatArray)
 
 
 def mean_decay(tau: FloatArray, start: FloatArray, stop: FloatArray) -> FloatArray:
-    """The mean of exp(-t/τ) over start..stop."""
+    """Mean of exp(-t/τ) over start..stop."""
     return np.asarray(tau * (np.exp(-start / tau) - np.exp(-stop / tau)) / (stop - start))

@@ -71,8 +71,8 @@ def planned(
     wear: float,
     made: int = 0,
 ) -> Iterator[SimulatedRun]:
-    """The runs of a plan's tests on a clutch that a campaign has brought to `cycles` and `wear`, with the duty cycles up to
-    each. `made`: how many tests of plans it has had, which tells their noise and their names apart."""
+    """Simulated runs of a plan's tests on a clutch that a campaign has brought to `cycles` and `wear`, with the duty
+    cycles up to each. `made` is the number of planned tests before, which distinguishes their noise and their names."""
     rig = _Rig(seed=seed, clutch=clutch, sensor=sensor, programme=RigProgramme(engagements=True, ageing=ageing))
     for test in tests:
         if test.cycles > cycles:
@@ -98,7 +98,7 @@ def end_of_life(course: Iterable[tuple[float, float]], clutch: SimulatedClutch, 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Rig:
-    """One clutch on the rig, with what its campaign is made of."""
+    """One clutch on the simulated rig, with its seed, sensor and programme."""
 
     seed: int
     clutch: SimulatedClutch
@@ -106,7 +106,7 @@ class _Rig:
     programme: RigProgramme
 
     def runs(self, stop_fraction: float, most_tests: int) -> Iterator[SimulatedRun]:
-        """Fig. 2."""
+        """The runs of a campaign in the order of fig. 2."""
         duty, record = self._engaged(RUN_IN, 0, 0.0)
         run_id = f"sim-{self.seed}-run-in-00000"
         yield SimulatedRun(run_id=run_id, kind=RunKind.RUN_IN, cycles=0, duty=duty, record=record)
@@ -135,7 +135,8 @@ class _Rig:
         return self._aged(run, wear)
 
     def _engaged(self, block: DutyBlock, cycles: int, wear: float) -> tuple[DutyBlock, Record | None]:
-        """The block with its energy by an engagement of the clutch as it is at the block's start, and that one's record."""
+        """The block with the energy of one simulated engagement of the clutch at the block's start, and the record of
+        that engagement."""
         if not self.programme.engagements:
             return block, None
         drive = Drive(speed=block.initial_speed)
@@ -164,7 +165,7 @@ class _Rig:
             wear = loops.wear
 
     def _dynamic_run(self, cycles: int, wear: float, test: DynamicTest, number: int) -> SimulatedRun:
-        """The dynamic test of that number at a state; those after the first have noise and a name of their own."""
+        """The dynamic test of that number at a state; tests after the first have noise and a name of their own."""
         rng = _generator(self.seed, _DYNAMIC, cycles, *([number] if number else []))
         run = SimulatedRun(
             run_id=f"sim-{self.seed}-dynamic-{cycles:05d}" + (f"-{test.frequency:g}hz" if number else ""),

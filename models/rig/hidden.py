@@ -34,8 +34,9 @@ _MIDDLE = 6.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HiddenTest:
-    """One test of a clutch: `held` as it was measured, its clock [n] s (middles of plateaus, times of samples), velocity [n]
-    m/s >= 0, `curve` with the stationary parameters there, cycles since new and `wear`, the ζ of eq. 6."""
+    """One test of a clutch in which an effect is hidden: `held` as it was measured, its clock [n] s (middles of
+    plateaus, times of samples), velocity [n] m/s >= 0, `curve` with the stationary parameters there, cycles since new
+    and `wear`, the ζ of eq. 6."""
 
     held: Plateaus | Record
     clock: FloatArray
@@ -51,8 +52,8 @@ Change: TypeAlias = Callable[[float, HiddenTest], FloatArray]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HiddenEffect:
-    """An effect by its slug: what its size means, in `unit`, a size that shows, and the change of torque [n] Nm by a size in
-    that unit; `loops` where only loops and raw records show it."""
+    """An effect that can be hidden, by its slug: the meaning of its size, in `unit`, a size that shows, and the change
+    of torque [n] Nm by a size in that unit; `loops` where only loops and raw records show it."""
 
     slug: str
     meaning: str
@@ -63,7 +64,7 @@ class HiddenEffect:
 
 
 def hidden_in(run: SimulatedRun, clutch: SimulatedClutch, sizes: Mapping[str, float]) -> SimulatedRun:
-    """A simulated test with effects hidden in its torque, by slug and size; other runs as they are.
+    """A simulated test with effects hidden in its torque, by slug and size; other runs unchanged.
 
     Raises ValueError on an unknown slug.
     """
@@ -91,7 +92,7 @@ def effect_of(slug: str) -> HiddenEffect:
 
 
 def described(sizes: Mapping[str, float]) -> list[dict[str, str | float]]:
-    """What is hidden, for the file that says so."""
+    """Hidden effects as rows of slug, size, unit and meaning, for the file that accompanies the campaign."""
     effects = [effect_of(slug) for slug in sizes]
     return [
         {"effect": effect.slug, "size": sizes[effect.slug], "unit": effect.unit, "meaning": effect.meaning}
@@ -100,7 +101,8 @@ def described(sizes: Mapping[str, float]) -> list[dict[str, str | float]]:
 
 
 def clutch_for(clutch: SimulatedClutch, sizes: Mapping[str, float]) -> SimulatedClutch:
-    """The clutch that effects are hidden in: its friction lags by an attractor, and by a film only where that is hidden."""
+    """The clutch in which effects are hidden: its friction lags by an attractor, and by a film only where that is
+    hidden."""
     film = sizes.get("squeeze_film", 0.0)
     lag = replace(NO_LAG if film == 0.0 else clutch.lag, film_time=film, attractor=ATTRACTOR)
     return replace(clutch, lag=lag)
@@ -111,7 +113,7 @@ EFFECTS: dict[str, HiddenEffect] = {}
 
 
 def _hides(meaning: str, unit: str = "", *, size: float, loops: bool = False) -> Callable[[Change], Change]:
-    """Makes a change of torque an effect, whose slug is the function's name."""
+    """A decorator that registers a change of torque as an effect, whose slug is the function's name."""
 
     def listed(change: Change) -> Change:
         slug = change.__name__.removeprefix("_")

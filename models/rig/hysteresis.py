@@ -33,8 +33,9 @@ ATTRACTOR = 150.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FrictionLag:
-    """`film_time` τ_0 >= 0 [s] (0: no film), its `loss` λ over pressure [-], with the course's `scale` φ > 0 [cycles] and
-    `exponent` ε > 0 [-]; `attractor` C > 0 [Nm/s], None: none. Raises ValueError on values outside."""
+    """The simulated clutch's friction lag: `film_time` τ_0 >= 0 [s] (0: no film), its `loss` λ over pressure [-], with
+    the course's `scale` φ > 0 [cycles] and `exponent` ε > 0 [-]; `attractor` C > 0 [Nm/s], None: none. Raises
+    ValueError on values outside."""
 
     film_time: float = 0.1
     loss: LinearPressureLaw = field(default_factory=lambda: LinearPressureLaw(intercept=-2.75, slope=0.7e-5))
@@ -47,7 +48,7 @@ class FrictionLag:
         require_finite(self, ("scale", "exponent", "attractor"), positive=True)
 
     def film_time_at(self, pressure: FloatArray, cycles: float) -> FloatArray:
-        """τ_1 [...] s at pressure [...] Pa after cycles >= 0."""
+        """Film time τ_1 [...] s at pressure [...] Pa after cycles >= 0."""
         lost = np.maximum(self.loss(pressure), 0.0) * progress_fraction(cycles, self.scale, self.exponent)
         return np.asarray(self.film_time * np.exp(-lost), dtype=np.float64)
 

@@ -29,7 +29,7 @@ class PlannedTest:
     repeats: int = 1
 
     def dynamic(self) -> DynamicTest:
-        """Its swings."""
+        """The planned test as a dynamic test."""
         low, high = min(self.speeds), max(self.speeds)
         swing = DynamicTest(frequency=0.1 if self.frequency is None else self.frequency, pressures=self.pressures)
         middle, duration = 0.5 * (low + high), self.periods / swing.frequency
@@ -37,7 +37,7 @@ class PlannedTest:
 
 
 class Ageing(StrEnum):
-    """What drives eq. 6: duty cycles, or the energy dissipated in engagements and tests alike."""
+    """The quantity that drives eq. 6: duty cycles, or the energy dissipated in engagements and tests alike."""
 
     CYCLES = "cycles"
     ENERGY = "energy"
@@ -45,9 +45,9 @@ class Ageing(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RigProgramme:
-    """`dynamic`: the dynamic test after each stationary one, None: none, and `further` ones, at other frequencies. `raw`:
-    stationary tests as sampled records, None: as plateaus, at `pressures` [Pa]. `engagements`: integrate one a block, for
-    its energy and its trace.
+    """The tests and the ageing of a simulated campaign. `dynamic`: the dynamic test after each stationary one, None:
+    none, and `further` ones, at other frequencies. `raw`: stationary tests as sampled records, None: as plateaus, at
+    `pressures` [Pa]. `engagements`: integrate one a block, for its energy and its trace.
 
     Raises ValueError where energy is to age the clutch and no engagement gives it.
     """

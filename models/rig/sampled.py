@@ -26,7 +26,8 @@ from models.rig.truth import OPEN, PROTOCOL_PRESSURES, SimulatedClutch
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Recorder:
-    """Deviations of a sample: torque [Nm] (with `memory` [s]), speed [rad/s], pressure [Pa]; counts [1/unit], 0: none.
+    """The errors of the recorder: deviations of a sample of torque [Nm] (with `memory` [s]), speed [rad/s], pressure
+    [Pa]; counts [1/unit], 0: none.
 
     `lost` is the share of samples that are missing, `spikes_per_minute` how often torque has a spike. Raises
     ValueError on negative or not finite values and where lost is not below 1.
@@ -93,10 +94,9 @@ PROTOCOL = tuple(PROTOCOL_PRESSURES.tolist())
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DynamicTest:
-    """`frequency` [Hz], `offset` and `amplitude` [rad/s] of speed, `duration` at a pressure and `step` to the next [s],
-    `rate` [Hz]; `pressures` [Pa] in their order, the protocol's unless given. Raises ValueError unless all are positive and
-    the speed never falls below zero.
-    """
+    """The settings of a dynamic test: `frequency` [Hz], `offset` and `amplitude` [rad/s] of speed, `duration` at a
+    pressure and `step` to the next [s], `rate` [Hz]; `pressures` [Pa] in their order, the protocol's unless given.
+    Raises ValueError unless all are positive and the speed never falls below zero."""
 
     frequency: float = 0.1
     offset: float = 1000 * RPM
@@ -113,7 +113,7 @@ class DynamicTest:
             raise ValueError(f"amplitude must not exceed offset {self.offset}, got {self.amplitude}")
 
     def course(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Time [n] s, pressure [n] Pa and speed [n] rad/s as they are commanded."""
+        """Commanded time [n] s, pressure [n] Pa and speed [n] rad/s."""
         block, last = self.duration + self.step, len(self.pressures) - 1
         time = np.arange(math.floor((block * last + self.duration) * self.rate)) / self.rate
         turn = np.minimum((time / block).astype(np.int64), last)
@@ -124,9 +124,9 @@ class DynamicTest:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RawTest:
-    """`rate` [Hz] of the raw stationary record; `controller` [s] is the time in which speed and pressure come to 1/e of
-    a step, `dwell` [s] what a plateau lasts; `pressures` [Pa] as for the dynamic test. Raises ValueError
-    unless all are positive."""
+    """The settings of a raw stationary record: sampling `rate` [Hz], `controller` time constant [s] of speed and
+    pressure, duration `dwell` [s] of a plateau; `pressures` [Pa] as for the dynamic test. Raises ValueError unless all
+    are positive."""
 
     rate: float = 1000.0
     controller: float = 0.1
@@ -140,7 +140,7 @@ class RawTest:
         require_finite(self, ("rate", "controller", "dwell"), positive=True)
 
     def course(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Time [n] s, pressure [n] Pa and speed [n] rad/s as the controllers bring them about."""
+        """Time [n] s, pressure [n] Pa and speed [n] rad/s, with the controllers' lag."""
         pressure = np.repeat(self.pressures, REFERENCE_SPEEDS.size)
         speed = np.tile(REFERENCE_SPEEDS, len(self.pressures))
         time = np.arange(math.floor(self.dwell * speed.size * self.rate)) / self.rate
@@ -167,5 +167,5 @@ def sampled_test(
 
 
 def engagement_record(trace: Engagement, rng: np.random.Generator, sensor: Sensor) -> Record:
-    """What the recorder makes of one engagement."""
+    """The record of one engagement, with the recorder's noise and counts."""
     return Recorder().record(trace.time, trace.pressure, trace.speed, trace.torque, rng, sensor)

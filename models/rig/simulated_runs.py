@@ -10,7 +10,7 @@ from models.rig.stationary import PLATEAU_DURATION
 
 
 class RunKind(StrEnum):
-    """What the simulated rig did."""
+    """The kinds of run that the simulated rig makes."""
 
     RUN_IN = "run_in"
     DUTY_CYCLES = "duty_cycles"
@@ -20,7 +20,7 @@ class RunKind(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DutyBlock:
-    """Engagements in a row: how many, energy of each [J], initial speed [rad/s], maximum pressure [Pa]."""
+    """A row of equal engagements: their number, energy of each [J], initial speed [rad/s], maximum pressure [Pa]."""
 
     cycles: int
     energy_per_cycle: float
@@ -53,7 +53,7 @@ class SimulatedRun:
             raise ValueError(f"a {self.kind} run must carry {rule} and nothing else")
 
     def dissipated(self) -> float:
-        """Energy [J] that a test turned into heat, by its own channels; of a block, what its engagements did."""
+        """Energy [J] turned into heat: of a test by its own channels, of a duty block by its engagements."""
         if self.duty is not None:
             return self.duty.cycles * self.duty.energy_per_cycle
         if self.plateaus is not None:

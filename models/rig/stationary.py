@@ -27,7 +27,7 @@ OIL_TEMPERATURE = 273.15 + 85.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sensor:
-    """How the simulated rig measures. Everything is >= 0, and a zero switches its part off.
+    """The measurement errors of the simulated rig. Everything is >= 0, and a zero switches its part off.
 
     `noise` [-] of torque a plateau, `floor` [Nm] added to that, `gain_scatter` [-] of torque from run to run (all
     standard deviations), `torque_counts` [1/Nm] and `temperature_counts` [1/K] of the recorder. Raises ValueError on
@@ -59,7 +59,8 @@ def stationary_test(
     speeds: FloatArray = REFERENCE_SPEEDS,
     oil: float = OIL_TEMPERATURE,
 ) -> Plateaus:
-    """Simulate one stationary test after cycles >= 0 at pressures [p] Pa and speeds [s] rad/s: p s rows, by pressure.
+    """Plateaus of one simulated stationary test after cycles >= 0 at pressures [p] Pa and speeds [s] rad/s: p s rows,
+    by pressure.
 
     The oil is kept at `oil` [K].
 

@@ -40,7 +40,7 @@ def warmed(held: Held, clutch: SimulatedClutch, wear: float, strength: float = 1
 
 
 def warm_torque(held: Plateaus | Record, clutch: SimulatedClutch, wear: float, strength: float) -> FloatArray:
-    """A simulated test's torque [n] Nm as its oil's temperature makes it; `wear` is the ζ at which it was made.
+    """Torque [n] Nm of a simulated test, changed by its oil's temperature; `wear` is the ζ at which it was made.
 
     `strength` [-] is the power of the viscosity's ratio. Raises ValueError where no oil temperature was recorded.
     """
@@ -54,7 +54,7 @@ def warm_torque(held: Plateaus | Record, clutch: SimulatedClutch, wear: float, s
 
 
 def heat_flux(held: Plateaus | Record, geometry: Geometry) -> FloatArray:
-    """q [n] W/m², the power that the faces turn into heat over their area."""
+    """Heat flux q [n] W/m², the power that the faces turn into heat over their area."""
     return np.asarray(np.abs(held.torque * held.speed) / (geometry.lining_area * geometry.friction_faces))
 
 

@@ -87,7 +87,7 @@ class SimulatedClutch:
         return self.lag.torque(time, velocity, pressure, self.parameters(pressure, cycles), cycles)
 
     def capacity(self, cycles: float) -> Capacity:
-        """What the clutch can transfer after cycles >= 0."""
+        """The clutch's torque capacity [Nm] after cycles >= 0, as a function of pressure and velocity."""
 
         def transferred(pressure: float, velocity: float) -> float:
             at = self.parameters(max(pressure, OPEN), cycles)
@@ -176,7 +176,7 @@ FRESH, WORN = Surface(roughness=9.52e-6, skewness=-0.87), Surface(roughness=1.94
 
 
 def surface(clutch: SimulatedClutch, wear: float) -> Surface:
-    """What a profilometer would measure along the sliding direction after wear ζ >= 0 [duty cycles]; ValueError on another.
+    """Simulated surface profile along the sliding direction after wear ζ >= 0 [duty cycles]; ValueError on another.
 
         R(ζ) = R_fresh + s(ζ) (R_worn - R_fresh),    s(ζ) = min(1, (1 - μ(ζ)/μ(0)) / 0.5)
 

@@ -29,7 +29,7 @@ from models.tracking.prior import TrackPrior
 
 
 class CourseForm(IntEnum):
-    """Which signs φ and ε have."""
+    """The kinds of course, by the signs of φ and ε; the exponential and the logarithm are limits between them."""
 
     EQ_6 = 0
     ENDING = 1
@@ -40,12 +40,12 @@ class CourseForm(IntEnum):
 
     @property
     def scale_sign(self) -> float:
-        """That of φ: negative where the course ends."""
+        """The sign of φ: -1 where the course ends at a finite ζ."""
         return -1.0 if self in (CourseForm.ENDING, CourseForm.HYPERBOLIC) else 1.0
 
     @property
     def exponent_sign(self) -> float:
-        """That of ε."""
+        """The sign of ε."""
         return -1.0 if self in (CourseForm.ENDING, CourseForm.POWER, CourseForm.LOGARITHM) else 1.0
 
 
@@ -113,7 +113,7 @@ def basis(
 
 @lru_cache(maxsize=64)
 def log_form_weight(prior: TrackPrior) -> FloatArray:
-    """Log prior probability of each form; -inf for those that the prior is sure are not."""
+    """Log prior probability of each form [f]; -inf for forms that the prior excludes."""
     home = prior.eq_6_share * np.concatenate([[prior.law_share], (1.0 - prior.law_share) * SHARES])
     other_forms = (1.0 - prior.eq_6_share) * np.outer(COURSE_SHARES, OTHER_SHARES).ravel()
     once = np.concatenate([home, other_forms])
@@ -131,7 +131,8 @@ def form_of(course: NDArray[np.intp], size: FloatArray, proportional: NDArray[np
 
 
 def scatter_growth(form: NDArray[np.intp], relative: FloatArray) -> FloatArray:
-    """Factor on s² at values of `relative` size squared [t] under forms [n]; [n, t]."""
+    """Factors [n, t] on the scatter variance s² under forms [n], from the tests' relative squared values `relative`
+    [t]; 1 for forms whose scatter is the same at every value."""
     return np.where(FORM_PROPORTIONAL[form][:, None], relative, 1.0)
 
 
@@ -146,7 +147,7 @@ def course_of(scale: FloatArray, exponent: FloatArray) -> NDArray[np.intp]:
 def coefficients_at(
     log_scale: FloatArray, log_exponent: FloatArray, course: NDArray[np.intp]
 ) -> tuple[FloatArray, FloatArray]:
-    """φ and ε, each with its sign, of coordinates; broadcast against the course."""
+    """Signed φ and ε from the coordinates (log φ, log ε) of courses, all broadcast together."""
     fixed = _EXPONENT[course]
     return np.exp(log_scale) * _PLAIN_SCALE[course], np.where(
         np.isnan(fixed), np.exp(log_exponent) * EXPONENT_SIGN[course], fixed
@@ -154,13 +155,13 @@ def coefficients_at(
 
 
 def coordinates_of(scale: FloatArray, exponent: FloatArray, course: NDArray[np.intp]) -> tuple[FloatArray, FloatArray]:
-    """The coordinates (log φ, log ε) of signed φ and ε; the inverse of `coefficients_at`."""
+    """Coordinates (log φ, log ε) from signed φ and ε; the inverse of `coefficients_at`."""
     free = np.isnan(_EXPONENT[course])
     return np.log(scale / _PLAIN_SCALE[course]), np.where(free, np.log(np.abs(exponent)), 0.0)
 
 
 def log_scale_at(place: FloatArray, course: NDArray[np.intp], span: float) -> tuple[FloatArray, FloatArray]:
-    """log |φ| at a place of a lattice, and log |d log φ / d place|; `place` broadcasts against `course`.
+    """log |φ| at a lattice coordinate `place`, and log |d log φ / d place|; `place` broadcasts against `course`.
 
     A course that ends does so beyond what was measured, up to the progress `span`: its place is log(|φ| - span).
     """
@@ -171,7 +172,8 @@ def log_scale_at(place: FloatArray, course: NDArray[np.intp], span: float) -> tu
 
 
 def place_of(log_scale: FloatArray, course: NDArray[np.intp], span: float) -> FloatArray:
-    """The inverse of `log_scale_at`; just beyond `span` where a course has ended before."""
+    """The lattice coordinate of log |φ|, the inverse of `log_scale_at`; for a course that ended before `span`, that of
+    an end just beyond it."""
     place, ends = log_scale.copy(), SCALE_SIGN[course] < 0.0
     place[ends] += np.log(-np.expm1(np.minimum(math.log(span) - log_scale[ends], -ENDED)))
     return place

@@ -44,7 +44,8 @@ _GAIN = np.sqrt(3.0 / _LENGTHS)
 
 
 def smooth(progress: FloatArray, span: float, stretches: int = PAST + FUTURE) -> FloatArray:
-    """δ at ζ [...] for curvature of one deviation on each stretch of a course with q · size = 1; [..., stretches].
+    """δ [..., stretches] at ζ [...] for curvature of one standard deviation on each stretch alone, of a course with
+    q · size = 1.
 
     On a stretch of length h, in units of T, curvature has the deviation √(3/h): the deviation of δ at T is then 1.
     """
@@ -61,20 +62,23 @@ _BEGUN = np.concatenate(
 
 
 def value_and_slope_now() -> FloatArray:
-    """What curvature of one deviation on each stretch of the past adds to δ(T), row 0, and to T δ'(T), row 1; [2, PAST]."""
+    """δ(T), row 0, and T δ'(T), row 1, for curvature of one standard deviation on each stretch of the past alone;
+    [2, PAST]."""
     gain = _GAIN[:PAST]
     from_middle = 1.0 - _EDGES[:PAST] - 0.5 * _LENGTHS[:PAST]
     return np.asarray(np.stack([gain * _LENGTHS[:PAST] * from_middle, gain * _LENGTHS[:PAST]]))
 
 
 def columns(history: History) -> FloatArray:
-    """The further linear terms at every measurement: PAST of δ, then one for each step; [t, PAST + e]."""
+    """Design matrix [t, PAST + e] of the further linear terms at every measurement: PAST columns of δ, then one for
+    each step."""
     return _columns(history.progress.tobytes(), history.epoch.tobytes())
 
 
 @lru_cache(maxsize=16)
 def _columns(progress: bytes, epoch: bytes) -> FloatArray:
-    """They depend on the progress and the epochs alone, and the filters ask for them again and again."""
+    """Design matrix of the further linear terms, cached by progress and epochs alone, because the filters ask for it
+    again and again."""
     history = np.frombuffer(progress), np.frombuffer(epoch)
     shifted = history[1][:, None] >= np.array(later_epochs(history[1]))
     terms = np.concatenate([smooth(history[0], span_of(history[0]), PAST), shifted], axis=1)
@@ -83,7 +87,8 @@ def _columns(progress: bytes, epoch: bytes) -> FloatArray:
 
 
 def column_sds(prior: TrackPrior, size: FloatArray, history: History) -> FloatArray:
-    """Prior deviations of the further terms [n, PAST + e] of a history for discrepancies of relative size q [n]."""
+    """Prior standard deviations [n, PAST + e] of the further terms of a history for discrepancies of relative size q
+    [n]."""
     steps = history.step_sizes(prior)
     sds = np.empty((size.size, PAST + steps.size))
     sds[:, :PAST] = (size * prior.size)[:, None]
@@ -93,7 +98,7 @@ def column_sds(prior: TrackPrior, size: FloatArray, history: History) -> FloatAr
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CourseDiscrepancy:
-    """Courses beside eq. 6, one for each of n draws, in the unit of the quantity.
+    """Smooth discrepancies, steps and knees beside the courses of n draws, in the unit of the quantity.
 
     `span` is T; `size` [n] is q; `curvature` [n, PAST + FUTURE] multiplies `smooth`; the level steps by `height`
     [n, e] at progress `at` [e], and where `of_readings` [e] says so (None: nowhere) a sensor's alone. From the progress
@@ -111,13 +116,14 @@ class CourseDiscrepancy:
 
     @property
     def of_clutch(self) -> "CourseDiscrepancy":
-        """The courses without the steps that are a sensor's: what the clutch does, not what is read."""
+        """The discrepancies without the steps of zeroed sensors: the clutch's own deviation, not that of its
+        readings."""
         if self.of_readings is None or not self.of_readings.any():
             return self
         return replace(self, height=np.where(self.of_readings, 0.0, self.height))
 
     def __call__(self, own: FloatArray, progress: FloatArray) -> FloatArray:
-        """δ at each draw's own time [k, n], plus the steps up to ζ, [k, n] or [k, 1]; [k, n]."""
+        """Discrepancy [k, n]: δ at each draw's own time [k, n] plus the steps up to ζ, [k, n] or [k, 1]."""
         smooth_part = self._smooth_part(own)
         if self.at.size == 0:
             return smooth_part
@@ -125,7 +131,7 @@ class CourseDiscrepancy:
         return np.asarray(smooth_part + np.einsum("kne,ne->kn", begun, self.height))
 
     def measured(self, progress: FloatArray) -> FloatArray:
-        """The discrepancy at progress [k] of what was measured, up to T, where every draw's own time is ζ; [k, n]."""
+        """Discrepancy [k, n] of every draw at measured progress [k], up to T, where all draws' own time is ζ."""
         terms = np.concatenate([smooth(progress, self.span, PAST), progress[:, None] >= self.at], axis=1)
         return np.asarray(terms @ np.concatenate([self.curvature[:, :PAST], self.height], axis=1).T)
 
@@ -140,11 +146,11 @@ class CourseDiscrepancy:
 
     @property
     def present(self) -> NDArray[np.bool_]:
-        """Which draws are not eq. 6 alone [n]."""
+        """Whether each draw [n] has a discrepancy, a knee or a step."""
         return np.asarray((self.size > 0.0) | np.isfinite(self.knee) | self.height.any(axis=1))
 
     def taken(self, index: NDArray[np.intp]) -> "CourseDiscrepancy":
-        """The courses at `index`."""
+        """The discrepancies of the draws at `index`."""
         rows = {name: getattr(self, name)[index] for name in BY_DRAW}
         return replace(self, **rows)
 
@@ -154,7 +160,8 @@ BY_DRAW = ("size", "curvature", "height", "knee", "steepening")
 
 
 def _stretchwise(curvature: FloatArray, time: FloatArray) -> FloatArray:
-    """δ at each draw's own time [k, n], in units of T, from its level, slope and curvature where the stretch begins."""
+    """δ [k, n] at each draw's own time in units of T, from its level, slope and curvature at the beginning of the
+    stretch."""
     u = np.minimum(time, LEVELLING)
     stretch = np.minimum(np.searchsorted(_EDGES, u, side="right") - 1, PAST + FUTURE - 1)
     begun, draws = curvature @ _BEGUN, np.arange(curvature.shape[0])
@@ -173,8 +180,8 @@ def drawn(
     worn: FloatArray,
     rng: np.random.Generator,
 ) -> CourseDiscrepancy:
-    """Courses from drawn terms [n, PAST + e] in the unit of the quantity, each `worn` by a share of ξ0 [n] so far; the
-    future is drawn here."""
+    """Discrepancies of n draws from their drawn past terms [n, PAST + e], in the unit of the quantity; curvature ahead
+    and knees are drawn here. `worn` [n] is the share of ξ0 worn so far."""
     ahead = np.zeros((size.size, FUTURE))
     alive = size > 0.0
     ahead[alive] = rng.standard_normal((int(alive.sum()), FUTURE)) * (size[alive] * prior.size)[:, None]

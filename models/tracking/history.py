@@ -25,8 +25,8 @@ _row = attrgetter(*COLUMNS)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class History:
-    """The measurements so far, in the order they came: progress, value, variance, epoch, new levels and zeroed sensors, each
-    [t]."""
+    """The measurements so far, in order of arrival: progress, value, variance, epoch, new levels and zeroed sensors,
+    each [t]."""
 
     progress: FloatArray
     value: FloatArray
@@ -55,18 +55,18 @@ class History:
 
     @property
     def steps(self) -> FloatArray:
-        """The progress at which each epoch after the first begins, as far as it was measured [e]."""
+        """Progress [e] at which each epoch after the first begins, as far as it was measured."""
         begun = [self.progress[self.epoch >= epoch].min() for epoch in later_epochs(self.epoch)]
         return np.array(begun, dtype=np.float64)
 
     def step_sizes(self, prior: TrackPrior) -> FloatArray:
-        """The deviations of these steps, as shares of the size of the quantity [e]."""
+        """Prior standard deviations [e] of these steps, as shares of the size of the quantity."""
         sizes = step_sizes(self.epoch, self.new_levels, prior.step_size)
         return np.where(self.reading_steps, LEVEL_SIZE, sizes)
 
     @property
     def reading_steps(self) -> NDArray[np.bool_]:
-        """Which of these steps [e] are a sensor's alone: it was zeroed, and no other event lies there."""
+        """Whether each of these steps [e] is a sensor's alone: it was zeroed, and no other event lies there."""
         first = np.unique(self.epoch, return_index=True)[1]
         epochs, levels, zeroed = (np.diff(each[first]) for each in (self.epoch, self.new_levels, self.sensor))
         return np.asarray((zeroed > 0) & (epochs <= zeroed + levels))
@@ -93,8 +93,8 @@ def later_epochs(epoch: FloatArray) -> list[float]:
 
 
 def step_sizes(epoch: FloatArray, new_levels: FloatArray, step_size: float) -> FloatArray:
-    """How far the level may step where an epoch [t] after the first begins, as a share of the quantity's size [e]: as by an
-    event, or to a new level."""
+    """Prior standard deviations [e] of the level's step at each epoch [t] after the first, as shares of the quantity's
+    size: as by an event, or to a new level."""
     known = np.array([new_levels[epoch == each].max() for each in sorted(set(epoch.tolist()))])
     return np.where(np.diff(known) > 0, LEVEL_SIZE, step_size)
 

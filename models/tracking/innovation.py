@@ -20,7 +20,8 @@ from models.tracking.prior import TrackPrior
 def next_innovation(
     before: TrackPosterior, earlier: Sequence[Measurement], test: Measurement, prior: TrackPrior
 ) -> float | None:
-    """The innovation of a test by draws `before` it, which know the `earlier` ones; infinite beyond what a float expresses.
+    """The standardised innovation of a test under the draws `before` it, which know the `earlier` tests; infinite
+    beyond the range of a float.
 
     None where fewer than FEWEST_BEFORE come before it, or where an event that may shift the level lies between.
     """
@@ -30,7 +31,8 @@ def next_innovation(
 
 
 def innovation(before: TrackPosterior, test: Measurement, prior: TrackPrior) -> float:
-    """How far a test lies off the prediction of draws that do not know it, in deviations with its sign."""
+    """The standardised innovation of a test: its signed distance from the prediction of draws that do not know it, in
+    standard deviations."""
     off = test.value - before.values(np.array([test.progress]))[0]
     scaled = off / np.sqrt(before.scatter_variance(test.value, prior) + test.variance)
     with np.errstate(divide="ignore"):

@@ -45,7 +45,8 @@ class Sums:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EvaluationPoints:
-    """Where the closed form is taken: log |φ|, log |ε|, log s, the form (`courses`) [n]; which runs are outlying [t, n]."""
+    """Points at which the closed form is evaluated: log |φ|, log |ε|, log s and the form (`courses`), each [n], and
+    whether each run is outlying [t, n]."""
 
     log_scale: FloatArray
     log_exponent: FloatArray
@@ -70,8 +71,8 @@ class EvaluationPoints:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Terms:
-    """The further terms of the points `where` [j] after elimination: their prior deviations σ [p, j], and by row Lᵀ (in the
-    upper triangle) with N of the columns (1, y, b) beside it, [p, p + 3, j]."""
+    """Cholesky factors of the further terms at the points `where` [j]: prior deviations σ [p, j], and `rows`
+    [p, p + 3, j] with Lᵀ in the upper triangle and N of the columns (1, y, b) beside it."""
 
     where: NDArray[np.intp]
     sd: FloatArray
@@ -104,7 +105,7 @@ def evidence(sums: Sums, prior: TrackPrior) -> FloatArray:
 
 
 def drawn_pair(sums: Sums, prior: TrackPrior, normals: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Draws of (ξ0, Δ) given φ, ε, s and q, each [n], from standard normals [n, 2]."""
+    """Posterior draws of (ξ0, Δ) given φ, ε, s and q, each [n], from standard normals [n, 2]."""
     pivot, pull = _eliminate(sums, prior)
     a00 = sums.r + prior.initial_sd**-2
     change_variance = 1.0 / pivot
@@ -118,7 +119,8 @@ def drawn_pair(sums: Sums, prior: TrackPrior, normals: FloatArray) -> tuple[Floa
 
 
 def _eliminate(sums: Sums, prior: TrackPrior) -> tuple[FloatArray, FloatArray]:
-    """The precision of Δ once ξ0 is eliminated, and what pulls at it: Δ is their ratio."""
+    """Posterior precision of Δ with ξ0 eliminated, and the right-hand side of its normal equation; their ratio,
+    right-hand side over precision, is the mean of Δ."""
     least = prior.change_sd**-2
     lean = sums.rb / (sums.r + prior.initial_sd**-2)
     pull = sums.rby - lean * sums.ry
@@ -131,7 +133,7 @@ def _eliminate(sums: Sums, prior: TrackPrior) -> tuple[FloatArray, FloatArray]:
 
 
 def log_outlying(prior: TrackPrior, outlying: FloatArray | NDArray[np.bool_]) -> FloatArray:
-    """Log prior probability of which runs are outlying, along the first axis of [t, ...]."""
+    """Log prior probability of a set of outlying runs, flags along the first axis of [t, ...]."""
     count = outlying.sum(axis=0)
     if prior.outlying_share == 0.0:
         return np.where(count > 0, -np.inf, 0.0)
@@ -142,7 +144,8 @@ def log_outlying(prior: TrackPrior, outlying: FloatArray | NDArray[np.bool_]) ->
 def pointwise(
     history: History, prior: TrackPrior, points: EvaluationPoints, table: FloatArray | None = None
 ) -> tuple[Sums, Terms]:
-    """The sums at n points, each [n], and the further terms after elimination; `table` may hold their b [t, n]."""
+    """Weighted sums at n points, each [n], with the further terms eliminated, and their Cholesky factors; `table` may
+    hold the points' b [t, n]."""
     if history.value.size > WHOLE and table is None and not isinstance(history, MergedHistory):
         return _in_blocks(history, prior, points)
     b = points.basis(history.progress) if table is None else table
@@ -178,7 +181,7 @@ def pointwise(
 
 
 def _in_blocks(history: History, prior: TrackPrior, points: EvaluationPoints) -> tuple[Sums, Terms]:
-    """`pointwise` of a long history: the same but for rounding, by blocks of points that stay in the processor's cache.
+    """`pointwise` for a long history, equal up to rounding, in blocks of points that fit the processor's cache.
 
     On one of the stretches of δ, within an epoch, the columns Z are parabolas of progress: Z = P A with P = (1, v, v²). So
     the sums over its tests follow from those of r v^m, r y v^m and r b v^m. Blocks are equally wide, the last one filled up:
@@ -234,8 +237,8 @@ def _in_blocks(history: History, prior: TrackPrior, points: EvaluationPoints) ->
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Parabola:
-    """Tests between which the columns Z are parabolas of v: their coefficients `columns` [3, p], those of the products of
-    two of them, `products` [p, p, 5]; and what r and r b of these tests are weighted by, [9, k] and [4, k]."""
+    """A group of tests on which the columns Z are parabolas of v: coefficients `columns` [3, p], those of the products
+    of two of them, `products` [p, p, 5], and the weights [9, k] and [4, k] of r and of r b in the sums."""
 
     tests: slice
     columns: FloatArray
@@ -245,7 +248,7 @@ class _Parabola:
 
 
 def _parabolas(progress: FloatArray, y: FloatArray, epoch: FloatArray, *, span: float) -> list[_Parabola]:
-    """Tests [t] by ascending progress, one after the other on each stretch of δ in each epoch."""
+    """Groups of tests, one for each stretch of δ in each epoch; the tests [t] are in ascending progress."""
     later = np.array(later_epochs(epoch))
     stretch = np.clip(np.floor(progress / span * PAST), 0, PAST - 1)
     begun = np.flatnonzero((np.diff(stretch) != 0) | (np.diff(epoch) != 0)) + 1
@@ -271,7 +274,8 @@ def _parabolas(progress: FloatArray, y: FloatArray, epoch: FloatArray, *, span: 
 def solve_again(
     history: History, prior: TrackPrior, points: EvaluationPoints, index: NDArray[np.intp], sums: Sums, terms: Terms
 ) -> None:
-    """Put `pointwise` of changed points [k], which stand at `index` [k] and kept their sizes q, in its place."""
+    """Recomputes `pointwise` for changed points [k] at `index` [k], whose sizes q are unchanged, and writes it into
+    `sums` and `terms`."""
     own_sums, own_terms = pointwise(history, prior, points)
     for field in fields(Sums):
         getattr(sums, field.name)[index] = getattr(own_sums, field.name)
@@ -280,7 +284,7 @@ def solve_again(
 
 
 def solved_at(solved: tuple[Sums, Terms], index: NDArray[np.intp]) -> tuple[Sums, Terms]:
-    """`pointwise` of the points at `index`, by that of all of them."""
+    """`pointwise` at the points of `index`, selected from that of all points."""
     sums, terms = solved
     place = np.full(sums.r.size, -1)
     place[terms.where] = np.arange(terms.where.size)
@@ -293,7 +297,7 @@ def solved_at(solved: tuple[Sums, Terms], index: NDArray[np.intp]) -> tuple[Sums
 def last_outlying(
     history: History, prior: TrackPrior, points: EvaluationPoints, sums: Sums, terms: Terms, last: FloatArray
 ) -> Sums:
-    """The sums and where the last run, whose b is `last` [n], is taken to be outlying and was not before.
+    """The sums with the last run, of basis `last` [n], made outlying at every point where it was not.
 
     It gets a further term of its own with the deviation W, which is eliminated after the others.
     """
@@ -390,7 +394,7 @@ def tabulated(
 
 
 def drawn_terms(terms: Terms, off_initial: FloatArray, change: FloatArray, normals: FloatArray) -> FloatArray:
-    """Draws of the further terms given ξ0 (less its prior mean) and Δ, each [n], from normals [n, p]; [n, p].
+    """Posterior draws [n, p] of the further terms given ξ0 (minus its prior mean) and Δ, each [n], from normals [n, p].
 
     w = σ L⁻ᵀ (N_y - ξ0 N_1 - Δ N_b + z); zero where there are none.
     """
@@ -406,7 +410,8 @@ def drawn_terms(terms: Terms, off_initial: FloatArray, change: FloatArray, norma
 
 
 def _disturbed(prior: TrackPrior, size: FloatArray, history: History) -> tuple[NDArray[np.intp], FloatArray]:
-    """Which of the sizes q [n] have further terms, and the prior deviations σ of these [p, j]."""
+    """Indices [j] of the points, of sizes q [n], that have further terms (δ or level steps), and the prior standard
+    deviations σ [p, j] of those terms."""
     where = np.flatnonzero(size > 0.0) if history.steps.size == 0 else np.arange(size.size)
     return where, column_sds(prior, size[where], history).T
 
@@ -440,7 +445,7 @@ def _factored(rows: FloatArray, sd: FloatArray) -> FloatArray:
 
 
 def _without(sums: Sums, terms: Terms) -> Sums:
-    """The sums of the points less what the further terms take off them, in place."""
+    """The sums at the points minus the further terms' part, changed in place."""
     cross = terms.cross
     lost = {name: np.einsum("pj,pj->j", cross[i], cross[j]) for name, (i, j) in _PRODUCTS.items()}
     diagonal = np.einsum("kkj->kj", terms.rows[:, : terms.sd.shape[0]])

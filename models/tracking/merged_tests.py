@@ -97,8 +97,8 @@ def merged(history: History, prior: TrackPrior) -> History:
 def judged(
     value: FloatArray, variance: FloatArray, epoch: FloatArray, prior: TrackPrior
 ) -> tuple[FloatArray, NDArray[np.bool_], NDArray[np.bool_]]:
-    """Of tests by ascending progress the variance beside their own, which are not merged, and which of the others are taken
-    to be outlying; each [t]."""
+    """Three columns [t] for tests in ascending progress: the scatter variance beside each test's own, whether the test
+    is kept apart from merging, and whether it is otherwise taken as outlying."""
     off, scatter = _off_neighbours(value, variance, epoch)
     log_odds = _log_odds(off, variance + scatter, prior)
     apart = _apart(log_odds, epoch)
@@ -117,7 +117,7 @@ def _distinct(*columns: NDArray[Any]) -> NDArray[np.intp]:
 
 
 class _Bins:
-    """Tests by bin: `of` which each is [t], by their `weight` [t]."""
+    """A grouping of weighted tests into bins: `of` is each test's bin [t], `weight` its weight [t]."""
 
     def __init__(self, of: NDArray[np.intp], weight: FloatArray) -> None:
         self.of, self._weight = of, weight
@@ -133,8 +133,8 @@ class _Bins:
 
 
 def _off_neighbours(value: FloatArray, variance: FloatArray, epoch: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """How far each test is off the median of its neighbours in its epoch [t], and the variance beside its own that is usual
-    there [t]."""
+    """Deviation of each test from the median of its neighbours in its epoch [t], and the local scatter variance beside
+    the test's own [t]."""
     off, scatter = np.empty(value.size), np.empty(value.size)
     for each in np.unique(epoch):
         rows = np.flatnonzero(epoch == each)
@@ -148,15 +148,15 @@ def _off_neighbours(value: FloatArray, variance: FloatArray, epoch: FloatArray) 
 
 
 def _medians(values: FloatArray, beside: int, stride: int = 1) -> FloatArray:
-    """The median of as many values about each one as there are in `beside` of them on either side of it, or about one that
-    is less than a `stride` away [t]."""
+    """Running median [t] over `beside` values on either side of each value; with a `stride`, that of a value less than
+    a stride away."""
     half = min(beside, (values.size - 1) // 2)
     medians = np.median(sliding_window_view(values, 2 * half + 1)[::stride], axis=1)
     return np.asarray(medians[np.clip((np.arange(values.size) - half) // stride, 0, medians.size - 1)])
 
 
 def _log_odds(off: FloatArray, variance: FloatArray, prior: TrackPrior) -> FloatArray:
-    """Log odds that tests so far off a course [t] with that variance [t] are outlying."""
+    """Log odds [t] that tests with a deviation `off` [t] from the course and that variance [t] are outlying."""
     if prior.outlying_share == 0.0:
         return np.full(off.size, -np.inf)
     ratio = (prior.outlying_size * prior.size) ** 2 / variance
@@ -165,8 +165,8 @@ def _log_odds(off: FloatArray, variance: FloatArray, prior: TrackPrior) -> Float
 
 
 def _apart(log_odds: FloatArray, epoch: FloatArray) -> NDArray[np.bool_]:
-    """Which tests are not merged [t]: the newest, the first of each epoch, and those that may or may not be outlying, of
-    more than MAX_APART the most doubtful."""
+    """Whether each test [t] is kept apart from merging: the newest, the first of each epoch, and tests of doubtful
+    outlier odds, at most the MAX_APART most doubtful."""
     apart = np.zeros(log_odds.size, dtype=bool)
     doubt = np.abs(log_odds)
     most = np.argsort(doubt, kind="stable")[:MAX_APART]
@@ -177,7 +177,7 @@ def _apart(log_odds: FloatArray, epoch: FloatArray) -> NDArray[np.bool_]:
 
 
 def bins_of(progress: FloatArray) -> FloatArray:
-    """The bin of each of several tests, by ascending progress [t]."""
+    """The bin number [t] of each test, in ascending progress."""
     span = max(float(progress[-1] - progress[0]), 1e-300)
     share = (progress - progress[0]) / span
     start, end = np.log1p(share * progress.size), np.log1p((1.0 - share) * progress.size)
@@ -187,8 +187,9 @@ def bins_of(progress: FloatArray) -> FloatArray:
 def _course(
     progress: FloatArray, value: FloatArray, weight: FloatArray, epoch: FloatArray, sound: NDArray[np.bool_]
 ) -> tuple[FloatArray, FloatArray]:
-    """Slope and second derivative of the course at each bin, by the parabola of least squares through it and _AROUND `sound`
-    bins of its epoch on either side, or those that there are; 0 where these are fewer than four [k]."""
+    """Slope and second derivative [k] of the course at each bin, from a least-squares parabola through the bin and its
+    nearest `sound` neighbours in the epoch, up to _AROUND on either side; 0 where an epoch has fewer than four sound
+    bins."""
     slopes, bends = np.zeros(progress.size), np.zeros(progress.size)
     for each in np.unique(epoch):
         rows = np.flatnonzero((epoch == each) & sound)

@@ -27,8 +27,8 @@ _NEVER = -1e6
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Nodes:
-    """Nodes that stand for the posterior's mass: b [n, t], the variance of scatter and blur [n, t], q [n], and the logarithm
-    of the share of the mass that each stands for [n]."""
+    """A weighted sample of nodes that represents the posterior: b [n, t], the variance of scatter and blur [n, t], q
+    [n], and the log share of the mass that each represents [n]."""
 
     b: FloatArray
     noise: FloatArray
@@ -37,14 +37,14 @@ class Nodes:
 
 
 def _most_examined(history: History) -> int:
-    """How many sets are examined at most: where runs beyond doubt are merged few are possible. Of 34 lives of 1,000 tests
+    """Largest number of sets examined: where runs beyond doubt are merged few are possible. Of 34 lives of 1,000 tests
     none had other quantiles with 24 or 5."""
     return 4 if isinstance(history, MergedHistory) else 24
 
 
 def verdicts(prior: TrackPrior, history: History, outlying: FloatArray, nodes: Nodes) -> tuple[FloatArray, FloatArray]:
-    """By how much the log posterior at every node would change if a run were turned [n, t], and the log probability of the
-    data at the node [n]; for sets of outlying runs, one for all [t] or one a node [n, t], of 0 and 1.
+    """Gain [n, t] of log posterior at every node by turning a run's outlier flag, and the log probability of the data
+    at the node [n]; for sets of outlying runs, one for all [t] or one a node [n, t], of 0 and 1.
 
     With the rows x = (1, b, Z)σ of the linear terms, H = X (XᵀRX + I)⁻¹ Xᵀ and h = rH: a run lies off the prediction of
     the others by e/(1 - h), e being its residual, with the variance d/(1 - h).
@@ -83,14 +83,14 @@ def verdicts(prior: TrackPrior, history: History, outlying: FloatArray, nodes: N
 
 
 def gains(prior: TrackPrior, history: History, outlying: FloatArray, nodes: Nodes) -> FloatArray:
-    """By how much turning each run [t] of one set [t] would change the log posterior, the nodes summed over."""
+    """Gain [t] of log posterior by turning each run's outlier flag in one set [t], summed over the nodes."""
     total = nodes.log_weight[:, None] + verdicts(prior, history, outlying, nodes)[0]
     top = total.max(axis=0)
     return np.asarray(top + np.log(np.exp(total - top).sum(axis=0)))
 
 
 def at_once(prior: TrackPrior, history: History, outlying: FloatArray, nodes: Nodes) -> tuple[FloatArray, FloatArray]:
-    """The set [n, t] that each node arrives at by repeatedly turning all the runs that it would turn, from `outlying` [t];
+    """The set [n, t] at which each node arrives by repeatedly turning all flags of positive gain, from `outlying` [t];
     and a lower bound of that set's gain in log posterior, summed over nodes.
 
     Where several runs hide one another no single one of them is worth turning.
@@ -108,7 +108,8 @@ def at_once(prior: TrackPrior, history: History, outlying: FloatArray, nodes: No
 
 @dataclass(slots=True)
 class OutlierSearch:
-    """The sets examined so far, as bytes of their flags [t], with their log probability."""
+    """A best-first search over sets of outlying runs: the sets examined so far, as bytes of their flags [t], with their
+    log probability."""
 
     prior: TrackPrior
     history: History
@@ -131,7 +132,8 @@ class OutlierSearch:
         return np.frombuffer(max(left, key=self.log_probability.__getitem__))
 
     def learn(self, outlying: FloatArray, log_evidence: float, nodes: Nodes, best: Nodes) -> None:
-        """Take in a set's own evidence, and estimates of its neighbours' and of the sets that the `best` nodes arrive at."""
+        """Records a set's own evidence, and estimates for its neighbours and for the sets at which the `best` nodes
+        arrive."""
         total = log_evidence + float(log_outlying(self.prior, outlying))
         self.log_probability[outlying.tobytes()] = total
         self.expanded.add(outlying.tobytes())
@@ -145,7 +147,7 @@ class OutlierSearch:
                 self.log_probability[neighbour.tobytes()] = max(total + float(gain), known)
 
     def kept(self) -> FloatArray:
-        """The sets that hold nearly all of the mass, [c, t]."""
+        """The sets [c, t] that hold nearly all of the mass, most probable first."""
         best = max(self.log_probability.values())
         within = [key for key, value in self.log_probability.items() if value > best - 4.5]
         within.sort(key=self.log_probability.__getitem__, reverse=True)

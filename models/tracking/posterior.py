@@ -24,7 +24,7 @@ from models.tracking.prior import TrackPrior
 
 
 class SampleStatus(StrEnum):
-    """Whether a sample stands for the posterior: it does, or it is worth few draws."""
+    """Whether a weighted sample has enough effective draws to represent the posterior."""
 
     SOUND = "sound"
     FEW_DRAWS = "few_draws"
@@ -62,12 +62,12 @@ class TrackPosterior:
 
     @property
     def effective_draws(self) -> float:
-        """How many draws of equal weight would be worth as much, 1/Σ w²."""
+        """Effective sample size 1/Σ w²."""
         return 1.0 / float(np.square(self.weight).sum())
 
     @property
     def status(self) -> SampleStatus:
-        """Whether the sample stands for the posterior."""
+        """Whether the sample has enough effective draws to represent the posterior."""
         # a 5 % quantile rests on five draws then
         return SampleStatus.SOUND if self.effective_draws >= 100.0 else SampleStatus.FEW_DRAWS
 
@@ -80,18 +80,20 @@ class TrackPosterior:
 
     @property
     def degradation(self) -> DegradationLaw:
-        """The sample as coefficients of eq. 6, each [n]."""
+        """The sample as coefficients of eq. 6's family, each [n]."""
         return DegradationLaw(initial=self.initial, change=self.change, scale=self.scale, exponent=self.exponent)
 
     @property
     def of_clutch(self) -> "TrackPosterior":
-        """The sample of what the clutch does: without what a zeroed sensor adds to the readings."""
+        """The sample for the clutch itself, without the level steps of zeroed sensors, which are in the readings
+        only."""
         if self.discrepancy is None or (clutch := self.discrepancy.of_clutch) is self.discrepancy:
             return self
         return replace(self, discrepancy=clutch)
 
     def values(self, progress: FloatArray) -> FloatArray:
-        """ξ at progress ζ >= 0 [k], or [k, n] where draws differ, discrepancy and all; [k, n]."""
+        """ξ [k, n] of every draw at progress ζ >= 0, [k] or [k, n] where it differs between draws, discrepancy
+        included."""
         discrepancy, zeta = self.discrepancy, progress if progress.ndim == 2 else progress[:, None]
         values = self._without_knee(progress)
         furthest = float(progress.max(initial=0.0))
@@ -121,17 +123,17 @@ class TrackPosterior:
         return np.asarray(law + self.discrepancy(np.where(zeta > span, zeta_kept, zeta), zeta))
 
     def _share(self, progress: FloatArray) -> FloatArray:
-        """b at progress [k, n] or [k, 1]; [k, n]."""
+        """Basis b [k, n] of every draw at progress [k, n] or [k, 1]."""
         return np.asarray(basis(progress, self.log_scale, self.log_exponent, self.course) * UNIT_OF_CHANGE[self.course])
 
     @property
     def course_end(self) -> FloatArray:
-        """The ζ [n] at which a draw falls without bounds; inf where it does not."""
+        """Progress ζ [n] at which a draw falls without bounds; inf where it does not."""
         cliff = (self.scale < 0.0) & (self.exponent > -1.0) & (self.change < 0.0)
         return np.where(cliff, np.abs(self.scale), np.inf)
 
     def scatter_variance(self, value: float, prior: TrackPrior) -> FloatArray:
-        """The variance of the scatter from run to run at a value, by draw [n]."""
+        """Variance of the run-to-run scatter at a value, by draw [n]."""
         if self.proportional is None:
             return np.square(self.scatter)
         return np.asarray(np.square(self.scatter) * np.where(self.proportional, prior.relative_squared(value), 1.0))
@@ -145,32 +147,33 @@ class TrackPosterior:
         return replace(self, weight=weight, discrepancy=discrepancy, **rows_taken)
 
     def beside(self, offsets: FloatArray) -> FloatArray:
-        """Of what is added to each branch [b, k], or to all of them [1, k], what is added to each draw; [k, n] or [k, 1]."""
+        """Offsets [k, n] of the draws from offsets of the branches [b, k]; [k, 1] if all branches share one row
+        [1, k]."""
         if self.branch is None or len(offsets) == 1:
             return offsets[:1].T
         return np.asarray(offsets[self.branch].T)
 
     def of_branch(self, branch: int) -> "TrackPosterior":
-        """The draws of one branch."""
+        """The draws of one branch, weights normalised."""
         if self.branch is None:
             return self
         index = np.flatnonzero(self.branch == branch)
         return self.taken(index, self.weight[index] / self.weight[index].sum())
 
     def moments(self, sample: FloatArray) -> tuple[float, float]:
-        """Weighted mean and deviation of a function of the coefficients, evaluated at the sample [n]."""
+        """Weighted mean and standard deviation of a function of the coefficients, given its values at the draws [n]."""
         mean = float(self.weight @ sample)
         return mean, math.sqrt(max(0.0, float(self.weight @ np.square(sample - mean))))
 
 
 def joined(parts: Sequence[TrackPosterior]) -> TrackPosterior:
-    """The draws of all parts, which have one history of progress, one after the other, with their weights."""
+    """One sample with the draws of all parts, which share one history of progress, weights unchanged."""
     names = [field.name for field in fields(TrackPosterior) if field.init]
     return TrackPosterior(**{name: _joined([getattr(part, name) for part in parts]) for name in names})
 
 
 def mixture(parts: Sequence[tuple[float, TrackPosterior]]) -> TrackPosterior:
-    """Posteriors under several series of measurements as one: part i has its weight and is branch i."""
+    """A mixture of posteriors under several series of measurements: part i has its weight and becomes branch i."""
     weighted = [
         replace(part, weight=weight * part.weight, branch=np.full(part.weight.size, branch))
         for branch, (weight, part) in enumerate(parts)
@@ -179,7 +182,8 @@ def mixture(parts: Sequence[tuple[float, TrackPosterior]]) -> TrackPosterior:
 
 
 def _joined(columns: Sequence[Any]) -> Any:
-    """Columns one after the other, of discrepancies those that have a row a draw; what they share stays."""
+    """Concatenated columns of several samples; for discrepancies, their columns by draw are concatenated and the shared
+    fields kept."""
     first = columns[0]
     if isinstance(first, CourseDiscrepancy):
         rows = {name: np.concatenate([getattr(column, name) for column in columns]) for name in BY_DRAW}
@@ -195,7 +199,7 @@ class Tracker(Protocol[State]):
 
     @property
     def name(self) -> str:
-        """What the public contract calls it: `grid`, `particle` or `ukf`."""
+        """The filter's name in the public API: `grid`, `particle` or `ukf`."""
 
     def start(self, prior: TrackPrior) -> State:
         """The state before the first measurement."""

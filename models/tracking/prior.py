@@ -18,7 +18,7 @@ from models.tracking.measurement import Measurement
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrackPrior:
-    """Means and deviations; ξ0, Δ and the scatter in the unit of the quantity, φ in cycles.
+    """The prior of a track: means and deviations; ξ0, Δ and the scatter in the unit of the quantity, φ in cycles.
 
     `outlying_share` of the runs are off by a further normal of deviation `outlying_size`, `law_share` is the probability
     that there is no discrepancy beside eq. 6, `eq_6_share` that the course is that of eq. 6, `proportional_share` that the
@@ -64,7 +64,7 @@ class TrackPrior:
 
     @property
     def size(self) -> float:
-        """How large the quantity is, in its unit."""
+        """Size of the quantity, in its unit."""
         return max(abs(self.initial_mean), self.initial_sd)
 
     def relative_squared(self, value: FloatArray | float) -> FloatArray:

@@ -21,21 +21,22 @@ from models.tracking.prior import TrackPrior
 
 
 def systematic(weight: FloatArray, size: int, offset: float) -> NDArray[np.intp]:
-    """Indices [size], ascending, each i drawn weight_i · size times up to rounding; offset uniform in [0, 1)."""
+    """Ascending indices [size] by systematic resampling: index i is drawn weight_i · size times up to rounding;
+    `offset` is uniform in [0, 1)."""
     edges = np.cumsum(weight)
     drawn = np.searchsorted(edges, (np.arange(size) + offset) / size * edges[-1], side="right")
     return np.asarray(np.minimum(drawn, weight.size - 1), dtype=np.intp)
 
 
 def normalised(log_weight: FloatArray) -> FloatArray:
-    """Weights [n] that sum to one."""
+    """Weights [n] from their logarithms, scaled to sum to one."""
     weight = np.exp(log_weight - log_weight.max())
     return np.asarray(weight / weight.sum())
 
 
 def tempered(weight: FloatArray, log_factor: FloatArray, fewest: float = 60) -> FloatArray:
-    """Weights [n] times a factor [n], normalised, its logarithm shrunk until the `fewest` count that are a sample, or half
-    as many as without it."""
+    """Normalised weights [n] times e^(τ log_factor), with the largest τ <= 1 of the sequence 1, 0.8, 0.64, … that
+    leaves an effective sample size of `fewest`, or half of that without the factor if it is less."""
     normalized = weight / weight.sum()
     fewest = min(fewest, 0.5 / float(normalized @ normalized))
     off = log_factor - log_factor[weight > 0.0].max()
@@ -85,8 +86,9 @@ def with_linear_terms(
     normals: FloatArray,
     rng: np.random.Generator,
 ) -> TrackPosterior:
-    """Points of weights [n] that sum to one, with what is linear drawn given each: ξ0 and Δ by standard normals [n, 2], the
-    discrepancy and the steps by `rng`. `solved` is `linear_model.pointwise` of the points."""
+    """A posterior sample from points of weights [n] that sum to one, with the linear terms drawn given each point: ξ0
+    and Δ from standard normals [n, 2], discrepancy and steps from `rng`. `solved` is `linear_model.pointwise` of the
+    points."""
     sums, terms = solved
     initial, change = drawn_pair(sums, prior, normals)
     further = rng.standard_normal((weight.size, PAST + history.steps.size))

@@ -33,14 +33,15 @@ class LawDiscrepancy:
     laws: Laws
 
     def columns(self, design: Design) -> FloatArray:
-        """∂torque/∂coefficient [N, k] Nm at a design's rows."""
+        """Sensitivities ∂torque/∂coefficient [N, k] Nm at a design's rows."""
         prediction, points = predict(design, self.laws), design.points
         shares = self.form.shares(points.velocity, points.pressure, points.cycles)
         return prediction.change_at_rows(design, prediction.scene.curve[:, None] * shares, before_lag=True)
 
 
 def law_discrepancy(design: Design, laws: Laws, *, moving: bool) -> LawDiscrepancy:
-    """The discrepancy of the laws that fit a design; `moving`: along the speed as V_S does over pressure and life."""
+    """The discrepancy of the laws that fit a design; with `moving` its form shifts along speed as V_S does over
+    pressure and life."""
     velocity = design.rows.velocity[design.closed & design.rows.steady]
     first, last = float(design.facts.states[0]), float(design.facts.states[-1])
     by_pressure, by_life = _moved(laws, first, last) if moving else (np.zeros(1), np.zeros(1))
@@ -62,8 +63,8 @@ def law_discrepancy(design: Design, laws: Laws, *, moving: bool) -> LawDiscrepan
 
 
 def _moved(laws: Laws, first: float, last: float) -> tuple[FloatArray, FloatArray]:
-    """ln V_S [NODES] over the places of pressure at the first state, and over those of √life at the middle pressure, less
-    that of both; none where it moves by more than MOST_MOVED."""
+    """Shift of ln V_S [NODES] relative to the middle pressure at the first state: over pressure at the first state, and
+    over √life at the middle pressure. Both are 0 if V_S moves by more than MOST_MOVED."""
     lowest, highest = laws.frame.lowest, laws.frame.highest
     pressures = lowest + (highest - lowest) * np.clip(_NODES * (1.0 + 2.0 * MARGIN) - MARGIN, 0.0, 1.0)
     cycles, middle = first + (last - first) * _NODES**2, np.full(_NODES.size, 0.5 * (lowest + highest))
@@ -76,7 +77,7 @@ def _moved(laws: Laws, first: float, last: float) -> tuple[FloatArray, FloatArra
 
 
 def sizes_considered() -> list[tuple[LawSizes, float]]:
-    """Every combination of sizes with its log prior."""
+    """All combinations of the law's sizes, each with its log prior [nats]."""
     return [
         (LawSizes(form, pressure, life), float(np.log(a * b * c)))
         for form, a in criteria.FORM_SIZES.items()

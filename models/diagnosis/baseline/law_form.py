@@ -58,7 +58,7 @@ EXACT = LawSizes(0.0, 0.0, 0.0)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LawForm:
-    """The functions of which δ is a sum, on the ranges that a campaign measured."""
+    """The cosine functions whose sum is δ, on the ranges that a campaign measured."""
 
     slowest: float  # [m/s], as the next at the V_S of the middle pressure and the first state
     fastest: float
@@ -92,8 +92,8 @@ class LawForm:
     def share(
         self, coefficients: FloatArray, velocity: FloatArray, pressure: FloatArray, cycles: FloatArray
     ) -> FloatArray:
-        """δ [n] for coefficients [k]: as `shares` has it, by tables of its functions (error below 0.2 % of the highest
-        wave)."""
+        """δ [n] for coefficients [k], by interpolation in tables of the functions of `shares` (error below 0.2 % of the
+        highest wave)."""
         return self._share(coefficients.tobytes(), Same(velocity), Same(pressure), Same(cycles))
 
     @lru_cache(maxsize=8)  # noqa: B019 - as below; effects ask for it at a campaign's own speeds over and over
@@ -108,8 +108,9 @@ class LawForm:
     def _beside_speed(
         self, coefficients: bytes, pressure: Same[FloatArray], cycles: Same[FloatArray]
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """By what share of itself velocity [n] moves, f + g [n], and by what each function of speed is multiplied [n, m]:
-        h by 1, h' by its waves over pressure, h'' by the life."""
+        """Parts of δ that pressure and cycles alone determine: the factor [n] by which velocity is scaled (V_S moves),
+        f + g [n], and the multipliers [n, m] of the functions of speed: 1 for h, waves over pressure for h', life for
+        h''."""
         moved, high, gone = self._places(pressure, cycles)
         _, over_pressure, over_life = self._tables(coefficients)
         of_pressure = _between(over_pressure, high)
@@ -121,33 +122,35 @@ class LawForm:
     def _places(
         self, pressure: Same[FloatArray], cycles: Same[FloatArray]
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """By what share of itself velocity [n] moves, and places [n] within 0 ... 1 along pressure and √life."""
+        """The factor [n] by which velocity is scaled (V_S moves), and positions [n] within 0 ... 1 along pressure and
+        along √life."""
         high = (pressure.value - self.lowest) / max(self.highest - self.lowest, 1e-300)
         high = np.clip((high + MARGIN) / (1.0 + 2.0 * MARGIN), 0.0, 1.0)
         gone = np.sqrt(np.clip((cycles.value - self.first) / max(self.last - self.first, 1.0), 0.0, 1.0))
         return np.exp(-_at(high, self.moved_by_pressure) - _at(gone, self.moved_by_life)), high, gone
 
     def _speed(self, velocity: FloatArray, moved: FloatArray) -> FloatArray:
-        """Places [n] within 0 ... 1 along ln v."""
+        """Positions [n] within 0 ... 1 along ln v."""
         return np.log(np.clip(velocity * moved, self.slowest, self.fastest) / self.slowest) / self._width
 
     def _form(self, speed: FloatArray) -> FloatArray:
-        """h's waves [n, 1 + _SPEEDS] with the envelope."""
+        """Waves [n, 1 + _SPEEDS] of h over speed, with the envelope."""
         envelope = np.exp(_ENVELOPE * self._width * (1.0 - speed))
         return _waves(speed, _SPEEDS, _LENGTH / self._width) * envelope[:, None]
 
     def _pressure_factors(self, high: FloatArray) -> FloatArray:
-        """The waves over pressure [m, n] with which the form changes."""
+        """Waves over pressure [m, n] by which the form over speed changes."""
         return np.asarray(_CHANGES * _waves(high, self._of_pressure, _LAW_LENGTH)[:, 1 : 1 + _CHANGING_PRESSURES].T)
 
     @property
     def _width(self) -> float:
-        """Of the range of ln v."""
+        """Width of the range of ln v."""
         return max(float(np.log(self.fastest / self.slowest)), 1e-3)
 
     @lru_cache(maxsize=8)  # noqa: B019 - a few forms, and small tables
     def _tables(self, coefficients: bytes) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Columns at the nodes: h, what changes with each wave over pressure and with life; f and those waves; g."""
+        """Tables of δ's functions at the nodes: over speed h and its changes with each wave over pressure and with
+        life; over pressure f and those waves; over life g."""
         known = np.frombuffer(coefficients)
         form, at = self._form(_NODES), _SPEEDS + 1
         over_speed = [form @ known[:at]]
@@ -170,7 +173,7 @@ class LawForm:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LearnedLaw:
-    """δ as a campaign shows it."""
+    """The posterior mean of the law's discrepancy δ in a campaign."""
 
     form: LawForm
     coefficients: FloatArray  # [k]
@@ -181,7 +184,7 @@ class LearnedLaw:
 
 
 def _between(table: FloatArray, unit: FloatArray) -> FloatArray:
-    """Columns [n, m] of a table at the nodes, linear between them."""
+    """Columns [n, m] of a table at positions within 0 ... 1, by linear interpolation between its nodes."""
     place = unit * (_NODES.size - 1)
     before = np.minimum(place.astype(np.intp), _NODES.size - 2)
     left = (place - before)[:, None]
@@ -189,13 +192,13 @@ def _between(table: FloatArray, unit: FloatArray) -> FloatArray:
 
 
 def _at(unit: FloatArray, nodes: Sequence[float] | FloatArray) -> FloatArray:
-    """What even nodes over 0 ... 1 have there [n]."""
+    """Linear interpolation [n], at positions within 0 ... 1, of values at evenly spaced nodes over 0 ... 1."""
     return np.interp(unit, np.linspace(0.0, 1.0, len(nodes)), nodes)
 
 
 def _waves(unit: FloatArray, orders: int, length: float) -> FloatArray:
-    """Cosines [n, 1 + orders] over 0 ... 1, times the deviations that a squared-exponential covariance of a length gives
-    them; all variances sum to one."""
+    """Cosines [n, 1 + orders] over 0 ... 1, scaled by the standard deviations that a squared-exponential covariance of
+    a length gives their coefficients; the variances sum to one."""
     order: NDArray[np.int64] = np.arange(orders + 1)
     weight = np.exp(-0.5 * (np.pi * order * length) ** 2) * np.where(order > 0, 1.0, 0.5)
     scale = np.sqrt(weight / weight.sum() * np.where(order > 0, 2.0, 1.0))

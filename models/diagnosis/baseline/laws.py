@@ -54,7 +54,7 @@ _LEAST_VELOCITY = 1e-3
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Frame:
-    """The reference of the laws."""
+    """The reference values of the laws: pressure range, last state, loop pressures and velocity."""
 
     lowest: float  # pressure [Pa]
     highest: float
@@ -70,15 +70,16 @@ class Frame:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Laws:
-    """theta [ATTRACTOR + loop pressures + POWERS] and the frame that it refers to."""
+    """The parameter vector theta [ATTRACTOR + loop pressures + POWERS] of the baseline, and the frame that it refers
+    to."""
 
     theta: FloatArray
     frame: Frame
     learned: LearnedLaw | None = None  # how friction differs from them, for what changes pressure, speed or cycles
 
     def parameters(self, pressure: FloatArray, cycles: FloatArray, *, below: float = 0.0) -> FloatArray:
-        """M_s, M̄_c, V_S, C_v [n, 4] at pressure [n] Pa and cycles [n]. V_S is kept above 0, the others are as fitted.
-        `below` as `falling_weight` takes it."""
+        """Stribeck parameters M_s, M̄_c, V_S, C_v [n, 4] at pressure [n] Pa and cycles [n]. V_S is kept above 0, the
+        others are as fitted; `below` as in `falling_weight`."""
         begins, repeats = _stretches(pressure, cycles)
         return np.repeat(self._values(pressure[begins], cycles[begins], None, below)[0], repeats, axis=0)
 
@@ -137,7 +138,7 @@ class Laws:
         return replace(self, theta=theta)
 
     def by_pressure(self, pressure: FloatArray, cycles: FloatArray) -> FloatArray:
-        """d(M_s, M̄_c, V_S, C_v)/dp [n, 4] 1/Pa."""
+        """Derivatives d(M_s, M̄_c, V_S, C_v)/dp [n, 4] 1/Pa."""
         step = 1e-4 * self.frame.span
         ahead, behind = self.parameters(pressure + step, cycles), self.parameters(pressure - step, cycles)
         return np.asarray((ahead - behind) / (2 * step), dtype=np.float64)
@@ -154,7 +155,7 @@ class Laws:
 
 
 def _stretches(*keys: FloatArray) -> tuple[IntArray, IntArray]:
-    """First rows of stretches of equal keys, and how many rows each stretch has: a loop is one stretch."""
+    """First rows [b] and lengths [b] of stretches of equal keys: a loop is one stretch."""
     changes = np.any([np.diff(key, prepend=np.nan) != 0.0 for key in keys], axis=0)
     begins = np.flatnonzero(changes)
     return begins, np.diff(begins, append=changes.size)
@@ -163,9 +164,9 @@ def _stretches(*keys: FloatArray) -> tuple[IntArray, IntArray]:
 def falling_weight(
     high: FloatArray, span: float, fall: FloatArray, below: float = 0.0
 ) -> tuple[FloatArray, FloatArray]:
-    """w [n] of M̄_c's law at (p - P⁻)/(P⁺ - P⁻) = `high` [n], and its derivatives [n, 2] by `fall`: log p_0, p_0 in Pa, and
-    log b, b within CURVATURE_BOUNDS. Below P⁻ the law goes on by its tangent, for a hyperbola has its pole there; by itself
-    for `below` of the span (and of the way to the pole) first."""
+    """Weight w [n] of M̄_c's falling law at (p - P⁻)/(P⁺ - P⁻) = `high` [n], and its derivatives [n, 2] by `fall`: log
+    p_0, p_0 in Pa, and log b, b within CURVATURE_BOUNDS. Below P⁻ the law continues by its tangent, because a hyperbola
+    has its pole there; for the share `below` of the span (and of the way to the pole) it continues itself first."""
     ratio = float(np.clip(span / np.exp(fall[0]), 1e-3, 60.0))
     curvature = float(np.exp(np.clip(fall[1], *np.log(criteria.CURVATURE_BOUNDS))))
     at = np.append(high, 1.0)
@@ -186,7 +187,7 @@ def falling_weight(
 
 
 def _progress(cycles: FloatArray, log_half: float, log_exponent: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Eq. 6's share D [n], and dD/dlog h, dD/dlog ε [n]."""
+    """Share D [n] of eq. 6's change, and dD/dlog h, dD/dlog ε [n]."""
     exponent = np.exp(log_exponent)
     doubling = np.expm1(np.log(2.0) / exponent)
     ratio = cycles * doubling / np.exp(log_half)
@@ -208,7 +209,8 @@ def curve(velocity: FloatArray, parameters: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scene:
-    """The baseline at points [P]; with the clutch open there is no friction: all but parameters and decay is 0."""
+    """The baseline evaluated at points [P]; with the clutch open there is no friction: all but parameters and decay is
+    0."""
 
     points: Points
     facts: Facts
@@ -221,12 +223,12 @@ class Scene:
 
     @property
     def life(self) -> FloatArray:
-        """The share [P] of the measured life that has gone, 0 before its first state."""
+        """Share [P] of the measured life that has passed, 0 before its first state."""
         gone = (self.points.cycles - self.facts.states[0]) / self.facts.life
         return np.asarray(np.maximum(gone, 0.0), dtype=np.float64)
 
     def learned_share(self, velocity: FloatArray) -> FloatArray:
-        """δ [P] at the points under another velocity [P] m/s, as far as it was learned."""
+        """Learned discrepancy δ [P] of the law at the points under another velocity [P] m/s; 0 if none was learned."""
         learned = self.laws.learned
         if learned is None:
             return np.zeros_like(velocity)
@@ -234,19 +236,19 @@ class Scene:
 
     @property
     def by_pressure(self) -> FloatArray:
-        """∂S/∂p [P] Nm/Pa along the laws."""
+        """Derivative ∂S/∂p [P] Nm/Pa along the laws."""
         slopes = self.laws.by_pressure(self.points.pressure, self.points.cycles)
         return np.asarray(np.einsum("nk,nk->n", self.gradient, slopes), dtype=np.float64)
 
     @property
     def viscous(self) -> FloatArray:
-        """The viscous part C_v v^γ [P] Nm."""
+        """Viscous torque C_v v^γ [P] Nm."""
         torque = self.points.engaged * self.parameters[:, 3] * self.points.velocity**GAMMA
         return np.asarray(torque, dtype=np.float64)
 
     @property
     def open_powers(self) -> FloatArray:
-        """(v/v_0)^k [P, POWERS] with the clutch open, 0 elsewhere: the terms of its drag."""
+        """Terms (v/v_0)^k [P, POWERS] of the open clutch's drag, 0 where it is closed."""
         powers = np.zeros((self.points.engaged.size, POWERS))
         is_open = np.flatnonzero(self.points.engaged < 1.0)
         relative = self.points.velocity[is_open] / self.laws.frame.reference_velocity
@@ -260,8 +262,8 @@ class Scene:
         velocity: FloatArray | None = None,
         pressure: FloatArray | None = None,
     ) -> FloatArray:
-        """S (1 + δ) [P] Nm with other cycles, velocity [m/s] > 0 or pressure [Pa] at the points. Under another pressure
-        M̄_c's law goes on BELOW the lowest that was measured: it is the same clutch there."""
+        """Stationary curve S (1 + δ) [P] Nm with other cycles, velocity [m/s] > 0 or pressure [Pa] at the points. Under
+        another pressure M̄_c's law goes on BELOW the lowest that was measured: it is the same clutch there."""
         p = self.points.pressure if pressure is None else pressure
         v = self.points.velocity if velocity is None else velocity
         parameters = self.parameters
@@ -276,7 +278,7 @@ class Scene:
 
 
 def gradient_of(velocity: FloatArray, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """∂S/∂(M_s, M̄_c, V_S, C_v) [n, 4] and e [n] at velocity [n] m/s > 0."""
+    """Derivatives ∂S/∂(M_s, M̄_c, V_S, C_v) [n, 4] and the decay e [n] at velocity [n] m/s > 0."""
     decay = np.exp(-np.minimum(parameters[:, 2] / velocity, 700.0))
     m_s, m_c = parameters[:, 0], parameters[:, 1]
     columns = (1.0 - decay + m_c * decay, m_s * decay, -m_s * (m_c - 1.0) * decay / velocity, velocity**GAMMA)

@@ -41,7 +41,7 @@ _LEAST_SHARE = 1e-3
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Lag:
-    """The lag of loops [l] at phases [k]."""
+    """The lag of friction behind the stationary curve in loops [l] at phases [k]."""
 
     keep: FloatArray  # e^-x of each step [l, k]
     mean_keep: FloatArray  # (1 - e^-x)/x
@@ -55,7 +55,8 @@ class Lag:
 
 
 def lag_of(curve: FloatArray, attractor: FloatArray, angular_frequency: FloatArray) -> Lag:
-    """For curves S [l, k] Nm at evenly spaced phases, attractors C [l, k] or [l, 1] Nm/s > 0, frequencies [l] rad/s."""
+    """The lag in loops with curves S [l, k] Nm at evenly spaced phases, attractors C [l, k] or [l, 1] Nm/s > 0,
+    frequencies [l] rad/s."""
     strength = np.maximum(np.abs(curve), _LEAST_SHARE * np.abs(curve).max(axis=1, keepdims=True) + 1e-12)
     rate = np.clip(attractor / strength, 1e-9, 1e9)
     step = 2 * np.pi / (curve.shape[1] * angular_frequency[:, None])
@@ -75,14 +76,14 @@ def lag_of(curve: FloatArray, attractor: FloatArray, angular_frequency: FloatArr
 
 
 def _relaxed(keep: FloatArray, mean_keep: FloatArray, target: FloatArray) -> FloatArray:
-    """R[target] for targets [l, k, m]."""
+    """The periodic solution R[target] [l, k, m] of the relaxation towards targets [l, k, m]."""
     share_here, before = (1 - mean_keep)[:, :, None], (mean_keep - keep)[:, :, None]
     return _periodic(keep, share_here * target + before * np.roll(target, 1, axis=1))
 
 
 def _periodic(keep: FloatArray, gain: FloatArray) -> FloatArray:
-    """The periodic y [l, k, m] of y_i = keep_i y_{i-1} + gain_i, keep [l, k], gain [l, k, m]: once around from y = 0, then
-    the share of its end that was missing at its start is added."""
+    """The periodic solution y [l, k, m] of y_i = keep_i y_{i-1} + gain_i, keep [l, k], gain [l, k, m]: one turn from
+    y = 0, then the share of its end that was missing at its start is added."""
     from_zero = recursion(keep, gain)
     left = np.cumprod(keep, axis=1)[:, :, None]
     return np.asarray(from_zero + left * (from_zero[:, -1:] / (1 - left[:, -1:])), dtype=np.float64)
@@ -97,8 +98,8 @@ class Prediction:
     lag: Lag | None
 
     def change_at_rows(self, design: Design, change: FloatArray, *, before_lag: bool) -> FloatArray:
-        """A change [P] or [P, m] Nm at the points -> [N] or [N, m] at the rows; what changes the stationary curve goes
-        through the loops' lag first."""
+        """Change of torque at the rows, [N] or [N, m] Nm, from one at the points, [P] or [P, m] Nm. With `before_lag`
+        it is a change of the stationary curve and goes through the loops' lag first."""
         if before_lag and self.lag is not None:
             change = change.copy()
             loops = change[design.plateaus :].reshape(design.loops, PHASES, -1)
@@ -141,7 +142,7 @@ def frame_of(design: Design) -> Frame:
 
 
 def predict(design: Design, laws: Laws, parameters: FloatArray | None = None) -> Prediction:
-    """The torque at every row by the laws, whose parameters at the points [P, 4] may be known."""
+    """The predicted torque at every row; the laws' parameters at the points [P, 4] may be given."""
     scene = scene_of(laws, design.points, design.facts, parameters)
     at_points, lag = scene.curve, None
     if design.loops:

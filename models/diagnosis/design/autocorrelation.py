@@ -25,17 +25,17 @@ from models.records.periods import harmonics
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Correlation:
-    """Correlation of a row with the k-th after it, w ρ^k: `share` w is the part of the variance that is autocorrelated
-    (up to 1), `decay` ρ [0, 1) the factor per row. Beyond 1, as far as a spectrum allows, neighbours have much in common and
-    other rows nothing."""
+    """Correlation w ρ^k of a row with the k-th after it: `share` w is the part of the variance that is autocorrelated
+    (up to 1), `decay` ρ [0, 1) the factor per row. A share beyond 1, as far as a spectrum allows, means that neighbours
+    have much in common and other rows nothing."""
 
     share: float = 0.0
     decay: float = 0.0
 
     @staticmethod
     def of_neighbours(first: float, second: float) -> "Correlation":
-        """With these correlations [-] of the first and the second neighbour, as far as there is such a process: no spectrum
-        is negative anywhere, so w ρ is at most (1 + ρ)/2."""
+        """The correlation with these values [-] for the first and the second neighbour, as far as there is such a
+        process: no spectrum is negative anywhere, so w ρ is at most (1 + ρ)/2."""
         if first < 0.02:
             return Correlation()
         decay = min(max(second / first, 1e-3), 0.99)  # stationary and positive definite
@@ -43,13 +43,13 @@ class Correlation:
 
     @property
     def variance_inflation(self) -> float:
-        """How much stronger slow noise is than with independent neighbours [-]: the spectral density at frequency 0 over the
-        variance, 1 + 2 w ρ/(1 - ρ)."""
+        """Variance inflation [-] of slow noise: the spectral density at frequency 0 over the variance, 1 + 2 w
+        ρ/(1 - ρ), which is 1 for independent neighbours."""
         return 1.0 + 2.0 * self.share * self.decay / (1.0 - self.decay)
 
 
 def arma(correlation: Correlation) -> tuple[float, float]:
-    """(θ, s): the process with unit variance is x_i - ρ x_{i-1} = s (e_i + θ e_{i-1}), |θ| < 1."""
+    """ARMA(1, 1) coefficients (θ, s) of the process of unit variance x_i - ρ x_{i-1} = s (e_i + θ e_{i-1}), |θ| < 1."""
     rho, share = correlation.decay, correlation.share
     # autocovariances at lags 0 and 1 of x_i - ρ x_{i-1}
     at_0 = 1 + rho * rho - 2 * share * rho * rho
@@ -63,14 +63,14 @@ def arma(correlation: Correlation) -> tuple[float, float]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SampleAutocorrelation:
-    """Autocorrelations one and two samples on [-], and how many samples in a row fall into one bin."""
+    """Autocorrelations of samples at lags one and two [-], and the number of samples in a row within one bin."""
 
     first: float
     second: float
     per_bin: float
 
     def of_bins(self) -> tuple[float, float]:
-        """Correlations [-] of the means in neighbouring bins and in those next but one."""
+        """Correlations [-] of the means of neighbouring bins and of bins next but one."""
         if self.first <= 0.0 or self.second <= 0.0:
             return 0.0, 0.0
         samples, n = Correlation.of_neighbours(self.first, self.second), self.per_bin
@@ -83,7 +83,8 @@ class SampleAutocorrelation:
 def sample_autocorrelation(
     torque: FloatArray, phase: FloatArray, used: NDArray[np.bool_], per_bin: float
 ) -> SampleAutocorrelation | None:
-    """Of torque [n] Nm at phase [n] rad, where samples are `used` [n]; None where they are too few or all alike."""
+    """Autocorrelation of torque [n] Nm at phase [n] rad about its harmonics, of the samples `used` [n]; None where they
+    are too few or all alike."""
     # with fewer the bins themselves say as much
     if per_bin < 4.0 or np.count_nonzero(used) < 8 * (2 * criteria.SIGNAL_HARMONICS + 1):
         return None
@@ -102,8 +103,8 @@ def sample_autocorrelation(
 
 
 def bin_autocorrelation(loops: Sequence[SampleAutocorrelation | None]) -> tuple[float, float] | None:
-    """Correlations [-] of neighbouring bins, and of those next but one, averaged over loops; None where it was not estimated
-    for most of the loops. Loops that were sampled alike share their autocorrelations."""
+    """Correlations [-] of neighbouring bins, and of bins next but one, averaged over loops; None where most loops have
+    no estimate. Loops that were sampled alike share their autocorrelations."""
     estimated = [loop for loop in loops if loop is not None]
     if 2 * len(estimated) <= len(loops) or not estimated:
         return None

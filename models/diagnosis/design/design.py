@@ -34,7 +34,8 @@ IntArray = NDArray[np.intp]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Points:
-    """Columns [n]: plateaus, or phases of loops."""
+    """Points at which torque is predicted, or rows that are compared with data, as columns [n]: plateaus, or phases of
+    loops."""
 
     run: IntArray  # index into Design.runs
     cycles: FloatArray
@@ -55,7 +56,7 @@ class Points:
 
     @property
     def steady(self) -> NDArray[np.bool_]:
-        """[n] whether it is a plateau."""
+        """Whether each point [n] is a plateau."""
         return self.loop < 0
 
     def take(self, index: IntArray | NDArray[np.bool_]) -> "Points":
@@ -65,7 +66,8 @@ class Points:
 
 
 def mark_open(points: Points) -> Points:
-    """With what was measured below UNLOADED marked as an open clutch."""
+    """The points with pressures below UNLOADED marked as an open clutch; their pressure becomes the lowest closed
+    one."""
     closed = points.pressure >= UNLOADED
     lowest = float(points.pressure[closed].min()) if closed.any() else 1.0
     return replace(points, engaged=closed.astype(np.float64), pressure=np.where(closed, points.pressure, lowest))
@@ -87,7 +89,7 @@ def points_of(count: int, **known: FloatArray | IntArray | float | None) -> Poin
 
 
 def thinned(campaign: Campaign, notes: list[str]) -> Campaign:
-    """The campaign with states left out evenly where it is too large; `notes` gets a sentence on what was left out."""
+    """The campaign with states left out evenly where it is too large; `notes` gets a sentence on the omitted states."""
     looped = np.unique([run.cycles for run in campaign.dynamic])
     if looped.size > criteria.MOST_LOOP_STATES:
         kept = _evenly(looped, criteria.MOST_LOOP_STATES)
@@ -117,7 +119,7 @@ def _evenly(states: FloatArray, count: int) -> set[float]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Design:
-    """What the baseline and the effects are fitted to."""
+    """The design of a campaign's fit: points of prediction, rows of measured torque, and the facts beside them."""
 
     points: Points  # [P] plateaus first, then PHASES points a loop
     rows: Points  # [N] plateaus first, then the loops' bins
@@ -140,7 +142,7 @@ class Design:
 
     @property
     def closed(self) -> NDArray[np.bool_]:
-        """[N] whether the clutch is closed: there is friction, and its pressure means something."""
+        """Whether the clutch is closed at each row [N], so that there is friction and its pressure means something."""
         return self.rows.engaged > 0
 
     @property
@@ -150,11 +152,12 @@ class Design:
 
     @property
     def usual_torque(self) -> float:
-        """The median of the closed clutch's torque [Nm], kept off 0."""
+        """Median absolute torque of the closed clutch [Nm], kept off 0."""
         return max(float(np.median(np.abs(self.torque[self.closed]))) if self.closed.any() else 0.0, 1e-12)
 
     def to_rows(self, at_points: FloatArray) -> FloatArray:
-        """[P, ...] at points -> [N, ...] at rows: bins lie among their points, where their samples do."""
+        """Values [N, ...] at the rows from values [P, ...] at the points: each bin by a line through its points, at the
+        mean phase of its samples."""
         if not self.loops:
             return at_points
         out = np.empty((self.torque.size, *at_points.shape[1:]))
@@ -168,7 +171,7 @@ class Design:
 
 
 def build_design(campaign: Campaign) -> Design:
-    """All rows of a campaign. Never raises on a campaign that is valid by itself; it may have no rows."""
+    """The design of all rows of a campaign. Never raises on a campaign that is valid by itself; it may have no rows."""
     notes: list[str] = []
     thinned_campaign = thinned(campaign, notes)
     runs: list[StationaryRun | DynamicRun] = []
@@ -230,7 +233,7 @@ def build_design(campaign: Campaign) -> Design:
 
 
 def _shortest(points: Points) -> float | None:
-    """The shortest period of a loop [s]."""
+    """The shortest period of a loop [s]; None without loops."""
     frequencies = points.angular_frequency[~points.steady]
     return float(2 * np.pi / frequencies.max()) if frequencies.size else None
 
@@ -246,8 +249,8 @@ def _period_differences(
 
 
 def _chains(rows: Points) -> tuple[IntArray, ...]:
-    """Rows [b, n] that follow each other in runs of plateaus, then in loops, for the correlation of neighbours; those of one
-    length are whitened together."""
+    """Index arrays [b, n] of consecutive rows in runs of plateaus, then in loops, for the correlation of neighbours;
+    chains of one length are whitened together."""
     owner = np.where(rows.steady, rows.run, rows.loop + int(rows.run.max(initial=0)) + 1)
     edges = np.concatenate([[0], np.flatnonzero(np.diff(owner)) + 1, [owner.size]])
     starts, lengths = edges[:-1], np.diff(edges)

@@ -20,7 +20,8 @@ REFERENCES = ("reference_temperature", "usual_torque", "usual_pressure")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Facts:
-    """What the effects need to know beside the rows. Cycles and moments are as in the campaign."""
+    """The campaign's facts beside the rows that effects need: states, maintenance, rests, duty, oil and geometry.
+    Cycles and moments are as in the campaign."""
 
     geometry: Geometry
     oil: Oil
@@ -51,7 +52,7 @@ class Facts:
 
     @property
     def onsets(self) -> tuple[tuple[float, float, float], ...]:
-        """Where something may have changed: (state before, cycles midway, state after). Where there are more than
+        """Possible onsets of a change: (state before, cycles midway, state after). Where there are more than
         MOST_ONSETS, that many evenly, and those with an event in the log."""
         gaps = list(itertools.pairwise(self.states.tolist()))
         if len(gaps) > criteria.MOST_ONSETS:
@@ -105,8 +106,9 @@ def facts_of(campaign: Campaign) -> Facts:
 
 
 def _plate_warming(campaign: Campaign) -> tuple[float, float] | None:
-    """The line of the plate's rise [K] over the flux |M| ω/A of friction [W/m²]: by plateaus, which have time to warm, or by
-    loops where no plateau has the channel. Its rise at no flux, and its slope or the least that counts as warming."""
+    """Intercept [K] and slope [K m²/W] of the plate's temperature rise over the heat flux |M| ω/A of friction, by least
+    squares; None without a plate temperature. Plateaus are used, which have time to warm, or loops where no plateau has
+    the channel; the slope is at least the least that counts as warming."""
     plateaus, records = [run.plateaus for run in campaign.stationary], [run.record for run in campaign.dynamic]
     area = campaign.geometry.friction_faces * campaign.geometry.lining_area
     for tables in (plateaus, records):
@@ -139,7 +141,8 @@ def _rests(campaign: Campaign) -> dict[float, tuple[float, float]]:
 
 
 def _long_gaps(campaign: Campaign) -> list[tuple[float, float, float]]:
-    """When long gaps between runs ended [s], how long the rig was idle in them [s], and the cycles of the run after them.
+    """Long idle gaps between runs: when each ended [s], how long the rig was idle in it [s], and the cycles of the run
+    after it.
 
     Idle is the time between two runs less what the engagements between them took, at the pace of the fast blocks."""
     runs: list[Run] = [*campaign.tests, *campaign.duty]
@@ -160,8 +163,8 @@ def _long_gaps(campaign: Campaign) -> list[tuple[float, float, float]]:
 
 
 def _idle_time(gaps: FloatArray, timed: list[tuple[float, Run]], gap_follows_block: bool) -> tuple[float, FloatArray]:
-    """Seconds that an engagement takes, and what is left of the gaps [n] s: a block's engagements lie in the gap after its
-    moment, or in the one before it; engagements that were not sent lie between two tests."""
+    """Time [s] of one engagement, and the idle time [n] s of the gaps [n] s without engagements. A block's engagements
+    lie in the gap after its moment, or in the one before it; engagements that were not sent lie between two tests."""
     engagements = np.zeros(gaps.size)
     for i, ((_, earlier), (_, later)) in enumerate(itertools.pairwise(timed)):
         block = earlier if gap_follows_block else later

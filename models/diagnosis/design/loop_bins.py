@@ -29,9 +29,9 @@ from models.records.runs import Record, plate_rise
 
 
 def period_differences(torque: FloatArray, bins: NDArray[np.intp], turns: FloatArray, count: int) -> FloatArray:
-    """How far each bin's mean lies from its mean over all earlier periods, scaled to one sample's deviation:
-    [p - 1, count] Nm, from torque [n] Nm, its bins [n] (0 ... count - 1) and the periods since the start [n], of which p
-    were begun. NaN where no earlier period has samples in the bin, or this period has too few."""
+    """Deviations [p - 1, count] Nm of each bin's mean from its mean over all earlier periods, scaled to one sample's
+    deviation, from torque [n] Nm, its bins [n] (0 ... count - 1) and the periods since the start [n], of which p were
+    begun. NaN where no earlier period has samples in the bin, or this period has too few."""
     turn = np.floor(turns).astype(np.intp)
     periods = int(turn.max(initial=0)) + 1
     cell = turn * count + bins
@@ -58,7 +58,7 @@ _FINE = 6
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BinnedLoop:
-    """One pressure of a dynamic test, at PHASES phases and in BINS bins."""
+    """A loop at one pressure of a dynamic test, at PHASES phases and in BINS bins."""
 
     pressure: float  # [Pa]
     sign: float
@@ -79,7 +79,7 @@ class BinnedLoop:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Stretch:
-    """Samples [n] at one pressure, folded."""
+    """The samples [n] of a record at one pressure, folded to v >= 0."""
 
     time: FloatArray  # [s]
     velocity: FloatArray  # [m/s]
@@ -92,8 +92,8 @@ class _Stretch:
 
 
 def binned_loops(record: Record, geometry: Geometry) -> tuple[list[BinnedLoop], list[str]]:
-    """The loops of a record that can be evaluated, those without pressure too, and a sentence for each that cannot (none for
-    a pause between pressures)."""
+    """The loops of a record that can be evaluated, loops without pressure too, and a sentence for each that cannot
+    (none for a pause between pressures)."""
     record = record.take(np.argsort(record.time, kind="stable"))
     velocity, rise = geometry.sliding_velocity(record.speed), plate_rise(record)
     loops: list[BinnedLoop] = []
@@ -125,7 +125,8 @@ def binned_loops(record: Record, geometry: Geometry) -> tuple[list[BinnedLoop], 
 
 
 def _speed_cycle(time: FloatArray, velocity: FloatArray, before: Cycle | None) -> Cycle | str:
-    """The stretch's speed cycle: with the frequency of the stretch before where that fits here too, else fitted again."""
+    """The speed cycle of the stretch, with the frequency of the stretch before where that fits here too, else fitted
+    again."""
     count = SPEED_HARMONICS if before is None else before.cosine.size
     step = 1 if count > SPEED_HARMONICS else max(1, time.size // 400)  # corners need every sample
     t, v = time[::step], velocity[::step]
@@ -158,9 +159,9 @@ def _speed_cycle(time: FloatArray, velocity: FloatArray, before: Cycle | None) -
 
 
 def _effective_velocity(cycle: Cycle, time: FloatArray, velocity: FloatArray, slowest: float) -> FloatArray:
-    """The velocity [PHASES] m/s whose v^γ is the mean of v^γ about each phase: where the speed comes down to rest, S has a
-    cusp that friction, which lags, carries on for a while. A speed with corners is taken as it was measured, for harmonics
-    round them."""
+    """Effective velocity [PHASES] m/s, the power mean of order γ about each phase: where the speed comes down to rest,
+    S has a cusp that friction, which lags, carries on for a while. A speed with corners is taken as it was measured,
+    for harmonics round them."""
     fine: FloatArray = 2 * math.pi / (PHASES * _FINE) * (np.arange(PHASES * _FINE, dtype=np.float64) + 0.5)
     speed = cycle.value(fine)
     if cycle.cosine.size > SPEED_HARMONICS:
@@ -173,7 +174,7 @@ def _effective_velocity(cycle: Cycle, time: FloatArray, velocity: FloatArray, sl
 
 
 def _binned(stretch: _Stretch, cycle: Cycle) -> BinnedLoop | str:
-    """The stretch's loop, or a sentence on why it is left out."""
+    """The stretch's loop, or a sentence with the reason why it is left out."""
     time, torque = stretch.time, stretch.torque
     width = 2 * math.pi / PHASES
     phase = np.asarray(width * (np.arange(PHASES) + 0.5), dtype=np.float64)
@@ -223,7 +224,8 @@ def _binned(stretch: _Stretch, cycle: Cycle) -> BinnedLoop | str:
 def _plate_rise(
     stretch: _Stretch, inside: NDArray[np.bool_], number: NDArray[np.intp], phase: FloatArray
 ) -> FloatArray:
-    """The plate's rise at the phases [PHASES] K: the bins' means (`number` is the bin of each sample inside), and lines."""
+    """Temperature rise [PHASES] K of the plate at the phases, by linear interpolation of the bins' means (`number` is
+    the bin of each sample inside)."""
     if stretch.plate_rise is None:
         return np.full(phase.size, np.nan)
     count = np.bincount(number, minlength=BINS)

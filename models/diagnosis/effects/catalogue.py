@@ -45,13 +45,14 @@ BY_SLUG = {effect.slug: effect for effect in (*CATALOGUE, *RETIRED)}
 
 
 def effects_for(facts: Facts, without: frozenset[str] = frozenset()) -> list[Effect]:
-    """The effects with the priors that fit this campaign's clutch; those whose slugs are in `without` are left out."""
+    """The catalogue's effects with priors for this campaign's clutch; effects whose slugs are in `without` are left
+    out."""
     return [effect.sized(facts) for effect in CATALOGUE if effect.slug not in without]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Column:
-    """One point of an effect's grid."""
+    """One point of an effect's shape grid, with its log prior weight."""
 
     effect: Effect
     shape: Shape
@@ -60,7 +61,7 @@ class Column:
 
 
 def columns_of(effects: Sequence[Effect], facts: Facts) -> list[Column]:
-    """The grids of all effects, one after the other."""
+    """The points of all effects' shape grids, concatenated."""
     columns = []
     for effect in effects:
         grid = effect.grid(facts)
@@ -83,8 +84,8 @@ def columns_of(effects: Sequence[Effect], facts: Facts) -> list[Column]:
 
 
 def columns_at_rows(design: Design, prediction: Prediction, columns: Sequence[Column]) -> FloatArray:
-    """The changes [N, m] of small amplitudes, per unit, at the rows. What begins at a state is, after it, what it would be
-    from the start: no lag goes from one test to the next."""
+    """Changes of torque [N, m] Nm at the rows, per unit of a small amplitude, one column for each grid point. After its
+    onset a change equals one that was there from the start: no lag goes from one test to the next."""
     starts: dict[tuple[str, Shape], tuple[int, Effect]] = {}
     places = [
         starts.setdefault((c.effect.slug, c.effect.from_the_start(c.shape)), (len(starts), c.effect))[0]
@@ -101,7 +102,8 @@ def columns_at_rows(design: Design, prediction: Prediction, columns: Sequence[Co
 
 
 def change_columns(design: Design, prediction: Prediction, changes: list[tuple[FloatArray, bool]]) -> FloatArray:
-    """Changes at the points, each with whether it comes before the lag -> [N, m] at the rows."""
+    """Changes of torque [N, m] Nm at the rows, from changes [P] Nm at the points, each with whether it comes before the
+    loops' lag."""
     out = np.zeros((design.torque.size, len(changes)))
     for before in (True, False):
         chosen = [i for i, (_, flag) in enumerate(changes) if flag is before]

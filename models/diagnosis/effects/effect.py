@@ -49,17 +49,17 @@ class EffectKind(StrEnum):
 
 
 class Measure(StrEnum):
-    """What the usual size of an effect is in proportion to: a clutch of ten times the torque has a sensor of ten times the
-    zero shift."""
+    """The quantity to which an effect's usual size is proportional: a clutch of ten times the torque has a sensor of
+    ten times the zero shift."""
 
     TORQUE = "torque"
     PRESSURE = "pressure"
 
 
 class Discrepancy(StrEnum):
-    """Along what a template's form is uncertain (`effects.fitted_effect`); MOTION: in loops against plateaus. How an
-    effect depends on pressure is what distinguishes it from others, so no effect's own discrepancy is over PRESSURE; the
-    small one of every template is."""
+    """An axis along which a template's form is uncertain (`effects.fitted_effect`); MOTION: loops against plateaus. How
+    an effect depends on pressure is the mark that distinguishes it from others, so no effect's own discrepancy is over
+    PRESSURE; the small one of every template is."""
 
     SPEED = "speed"
     PRESSURE = "pressure"
@@ -70,7 +70,7 @@ class Discrepancy(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ShapeParameter:
-    """A shape parameter."""
+    """A shape parameter of an effect: name, unit, bounds, and how a fit treats it."""
 
     name: str
     unit: str
@@ -83,19 +83,19 @@ class ShapeParameter:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Felt:
-    """What an amplitude without a unit of its own comes to on the rig, for the paragraph."""
+    """A conversion of a unitless amplitude to a consequence on the rig, which the report's sentence states."""
 
     unit: str
     of: Callable[[float], float]  # of the amplitude in the effect's unit; monotonic
 
 
 def of_twice(exponent: float) -> float:
-    """What twice of something comes to by a power law: 2^x, for an exponent that may be anything."""
+    """Factor 2^x by which a power law with exponent x responds to a doubling; x is limited to ±100."""
     return math.exp2(max(min(exponent, 100.0), -100.0))
 
 
 def within(most: float | None) -> tuple[float, float]:
-    """Bounds of either sign; none where the campaign does not say how much is the most."""
+    """Bounds ±`most`; infinite where the campaign does not determine them (None)."""
     return (-math.inf, math.inf) if most is None else (-most, most)
 
 
@@ -155,21 +155,21 @@ class Effect:
     opposite_physics: str = ""  # a sentence for a negative amplitude, where `physics` holds for a positive one only
 
     def changes(self, scene: Scene, settings: Sequence[tuple[float, Shape]]) -> FloatArray:
-        """The changes [P, m] Nm of several (amplitude, shape)."""
+        """Changes of torque [P, m] Nm for several pairs (amplitude, shape)."""
         if self.several is not None:
             return self.several(scene, settings)
         return np.stack([self.change(scene, amplitude, shape) for amplitude, shape in settings], axis=1)
 
     def stiff(self, shape: Shape) -> Shape:
-        """The shapes that a refit does not move."""
+        """The values of the shapes that a refit does not move."""
         return tuple(value for value, parameter in zip(shape, self.shapes, strict=True) if not parameter.smooth)
 
     def smooth(self, shape: Shape) -> list[tuple[float, ShapeParameter]]:
-        """The shapes that a refit moves, each with its parameter."""
+        """The values of the shapes that a refit moves, each with its parameter."""
         return [(x, parameter) for x, parameter in zip(shape, self.shapes, strict=True) if parameter.smooth]
 
     def onset(self, shape: Shape) -> float:
-        """The cycle from which on it is at work."""
+        """The cycle from which the effect is at work."""
         return shape[-1] if self.begins else FROM_THE_START
 
     def from_the_start(self, shape: Shape) -> Shape:
@@ -177,7 +177,7 @@ class Effect:
         return (*shape[:-1], FROM_THE_START) if self.begins else shape
 
     def lags(self, shape: Shape) -> bool:
-        """Whether friction in loops lags behind what the effect changes."""
+        """Whether the effect changes the stationary curve, so that friction in loops lags behind its change."""
         if self.before_lag is not None:
             return self.before_lag
         return any(value >= parameter.lags_from for value, parameter in zip(shape, self.shapes, strict=False))
@@ -194,16 +194,16 @@ class Effect:
 
     @property
     def positive(self) -> bool:
-        """Whether it has one sign."""
+        """Whether the amplitude cannot be negative."""
         return self.lowest >= 0.0
 
     def within(self, amplitude: float) -> float:
-        """The amplitude, or the bound that it is beyond. One that is negative and cannot be is left as it is: a fit passes
-        through there, and one that ends there found nothing at work."""
+        """The amplitude, limited to its bounds. A negative amplitude of a one-sided effect is left as it is: a fit
+        passes through there, and a fit that ends there found nothing at work."""
         return min(amplitude if self.positive else max(amplitude, self.lowest), self.highest)
 
     def unit_changes(self, scene: Scene, shapes: Sequence[Shape]) -> FloatArray:
-        """The changes [P, m] Nm of a small amplitude, per unit: the columns that a linear screen works with."""
+        """Changes of torque [P, m] Nm per unit of a small amplitude: the columns of the linear screen."""
         step = 1e-3 * self.prior_sd
         return self.changes(scene, [(step, shape) for shape in shapes]) / step
 
@@ -215,7 +215,7 @@ class Effect:
         return 0.5 * (self.tails + 1.0) * math.log1p(squared / self.tails)
 
     def amplitude_precision(self, amplitude: float) -> float:
-        """(d cost/da)/a, in 1/unit²: what a normal prior with the same slope at a would have."""
+        """(d cost/da)/a, in 1/unit²: the precision of a normal prior with the same slope at a."""
         if math.isinf(self.tails):
             return float(self.prior_sd**-2.0)
         return float((self.tails + 1.0) / (self.tails * self.prior_sd**2 + amplitude**2))
@@ -231,10 +231,10 @@ class Effect:
 
 
 def begins(effect: Effect) -> Effect:
-    """An effect whose last shape is the cycle from which on it is at work: from the start or from a state on, the one as
-    probable as the other, and each state as probable as the next. What is wrong need not have been wrong in the first test,
-    and were a step in the template of one effect alone, any step would be taken for that effect. A step is tried with its
-    likeliest kinds of shapes, and of each with the likeliest shape: a refit moves the others."""
+    """The effect with an onset cycle as its last shape: from the start or from a state on, the one as probable as the
+    other, and each state as probable as the next. A fault need not have been there in the first test, and were a step
+    in the template of one effect alone, any step would be taken for that effect. A step is tried with its likeliest
+    kinds of shapes, and of each with the likeliest shape: a refit moves the others."""
     own = len(effect.shapes)
 
     def grid(facts: Facts) -> tuple[Tried, ...]:
@@ -274,8 +274,9 @@ SCALES = (1.0, 6.0)
 
 
 def followed(target: FloatArray, points: Points, settling: float) -> FloatArray:
-    """The mean over each plateau [P] of a quantity that relaxes to that plateau's target [P] with the time constant
-    `settling` [s], beginning at what the plateau before ended with. A run's first plateau and loops are at their target."""
+    """The mean over each plateau [P] of a quantity that relaxes towards that plateau's target [P] with the time
+    constant `settling` [s], from its value at the end of the plateau before. A run's first plateau and loops are at
+    their target."""
     follows = np.flatnonzero(points.previous >= 0)  # each follows the point just before it
     before = points.previous[follows]
     durations = np.maximum(points.clock[follows] - points.clock[before], 1e-6) / settling  # in time constants
@@ -295,7 +296,7 @@ def by_loop(points: Points, looping: IntArray) -> tuple[FloatArray, FloatArray]:
 
 
 def lagging(target: FloatArray, frequency: FloatArray, time: float) -> FloatArray:
-    """The periodic answer [l, PHASES] of a lag of the first order in `time` s to a target [l, PHASES], harmonic by harmonic;
+    """The periodic response [l, PHASES] of a first-order lag of `time` s to a target [l, PHASES], harmonic by harmonic;
     frequency [l, 1] rad/s."""
     waves = np.fft.rfft(target, axis=1)
     waves = waves / (1 + 1j * np.arange(waves.shape[1]) * frequency * time)
@@ -303,5 +304,5 @@ def lagging(target: FloatArray, frequency: FloatArray, time: float) -> FloatArra
 
 
 def flattening(life: FloatArray, share: float) -> FloatArray:
-    """A course x (1 + s)/(x + s) over a share x [n] of life, 1 at its end: half done after about s."""
+    """The course x (1 + s)/(x + s) over the share x [n] of life, 1 at its end; half of it is done after about s."""
     return life * (1.0 + share) / (life + share)

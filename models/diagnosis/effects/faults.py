@@ -23,7 +23,7 @@ _STEP, _CREEP = 0.0, 1.0
 
 
 def last_direction(values: FloatArray, previous: IntArray) -> FloatArray:
-    """[P] 1 where a value was last raised before a plateau, -1 where it was lowered, 0 where that is unknown. `previous` [P]
+    """Direction [P] in which a value was last changed before a plateau: 1 raised, -1 lowered, 0 unknown. `previous` [P]
     is the plateau before it, -1 where there is none; plateaus of a run follow each other."""
     has_previous = previous >= 0
     change = np.where(has_previous, values - values[np.maximum(previous, 0)], 0.0)
@@ -50,7 +50,7 @@ def _gains_with_life(facts: Facts) -> tuple[Tried, ...]:
 
 
 def _gain_with_life(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
-    """a S from a cycle on, or a S (ζ/ζ_last)^q [P] Nm."""
+    """Change of torque a S from a cycle on, or a S (ζ/ζ_last)^q [P] Nm."""
     course, value = shape
     share = np.where(scene.points.cycles > value, 1.0, 0.0) if course == _STEP else scene.life**value
     return np.asarray(amplitude * share * scene.curve, dtype=np.float64)
@@ -61,7 +61,7 @@ def _gains_with_clock(_: Facts) -> tuple[Tried, ...]:
 
 
 def _gain_with_clock(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
-    """a S t/30 min, or a S (1 - e^{-t/τ}) [P] Nm."""
+    """Change of torque a S t/30 min, or a S (1 - e^{-t/τ}) [P] Nm."""
     time, in_loops = shape
     clock = np.maximum(scene.points.clock, 0.0)
     share = -np.expm1(-clock / time) if time > 0 else clock / 1800.0
@@ -70,7 +70,8 @@ def _gain_with_clock(scene: Scene, amplitude: float, shape: Shape) -> FloatArray
 
 
 def _parameter_scaled(parameter: str) -> Callable[[Scene, float, Shape], FloatArray]:
-    """S with (1 + a) θ less S with θ [P] Nm, θ a parameter of eq. 3 (one of PARAMETER_NAMES)."""
+    """A change of torque by a scaled parameter, S with (1 + a) θ minus S with θ [P] Nm, θ a parameter of eq. 3 (one of
+    PARAMETER_NAMES)."""
     place = PARAMETER_NAMES.index(parameter)
 
     def change(scene: Scene, amplitude: float, _shape: Shape) -> FloatArray:
@@ -95,7 +96,7 @@ def _fault(
     *,
     before_lag: bool = False,
 ) -> Effect:
-    """A fault with so many `shapes` that are taken from its grid."""
+    """A rig fault that is never named, with so many `shapes` from its grid."""
     return Effect(
         slug=slug,
         title=title,
@@ -113,7 +114,7 @@ def _fault(
 
 
 def _step(slug: str, title: str, change: Callable[[Scene, float, Shape], FloatArray]) -> Effect:
-    """A fault from a cycle on, and not from the start: the baseline has absorbed it there."""
+    """A rig fault with an onset after the first state: the baseline absorbs a fault that is there from the start."""
     fault = begins(_fault(slug, title, CYCLES, change, before_lag=True))
 
     def grid(facts: Facts) -> tuple[Tried, ...]:

@@ -35,7 +35,7 @@ Ranges: TypeAlias = Mapping[Discrepancy, tuple[float, float]]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FittedEffect:
-    """An effect in a model."""
+    """An effect with its fitted amplitude and shape."""
 
     effect: Effect
     amplitude: float
@@ -48,7 +48,7 @@ class FittedEffect:
         return self.effect.positive and self.amplitude < 0
 
     def rows(self, design: Design, prediction: Prediction) -> FloatArray:
-        """The change [N] Nm at the rows."""
+        """The effect's change of torque [N] Nm at the rows."""
         change = self.effect.change(prediction.scene, self.amplitude, self.shape)
         return prediction.change_at_rows(design, change, before_lag=self.effect.lags(self.shape))
 
@@ -69,18 +69,20 @@ class FittedEffect:
 
     @property
     def precisions(self) -> FloatArray:
-        """1/sd² of the priors on (amplitude, smooth shapes) [1 + s]; that of the amplitude where it is."""
+        """Precisions 1/sd² of the priors on (amplitude, smooth shapes) [1 + s]; of the amplitude's heavy-tailed prior,
+        at the fitted value."""
         widths = [0.5 * (shape.highest - shape.lowest) for _, shape in self.effect.smooth(self.shape)]
         return np.array([self.effect.amplitude_precision(self.amplitude), *(width**-2.0 for width in widths)])
 
     @property
     def smooth_places(self) -> list[int]:
-        """Which of its shapes are smooth."""
+        """Indices of the smooth ones among the effect's shapes."""
         return [place for place, shape in enumerate(self.effect.shapes) if shape.smooth]
 
     @property
     def free(self) -> NDArray[np.bool_]:
-        """Which of (amplitude, smooth shapes) [1 + s] a refit may move: what is at a bound stays there."""
+        """Whether each of (amplitude, smooth shapes) [1 + s] lies inside its bounds; a parameter at a bound stays there
+        in a refit."""
         margins = [
             min(value - shape.lowest, shape.highest - value) / (shape.highest - shape.lowest)
             for value, shape in self.effect.smooth(self.shape)
@@ -93,7 +95,8 @@ class FittedEffect:
         return self.rows(design, prediction)[:, None] * discrepancy_factors(design, self.effect)
 
     def drawn(self, scene: Scene, ranges: Ranges) -> FloatArray:
-        """Change of torque [P] Nm in a draw. A course that is followed far enough ends friction; it does not reverse it."""
+        """Change of torque [P] Nm in a posterior draw, template errors included. A course that is followed far enough
+        ends friction; it does not reverse it."""
         change = self.effect.change(scene, self.amplitude, self.shape)
         if any(self.factors):
             factors = np.concatenate(
@@ -131,19 +134,19 @@ _SMALL = {Discrepancy.SPEED: 4, Discrepancy.PRESSURE: 2, Discrepancy.LIFE: 3, Di
 
 
 def ranges_of(rows: Points) -> Ranges:
-    """The ranges over which a campaign's rows vary."""
+    """Lowest value and range of a campaign's rows on every axis of `Discrepancy`."""
     return {along: (float(values.min()), float(np.ptp(values))) for along, values in _coordinates(rows).items()}
 
 
 def factors_at(points: Points, effect: Effect, ranges: Ranges) -> FloatArray:
-    """φ [P, m] at points, each within ±1, along what the effect's form is uncertain in and a campaign varied; beyond its
-    range that at its end."""
+    """Factors φ [P, m] of an effect's own discrepancy at points, each within ±1, over the axes that a campaign varied;
+    beyond a campaign's range, their value at its end."""
     return _cosines(points, {along: _ORDERS.get(along, 1) for along in effect.discrepancies}, ranges)
 
 
 def small_factors_at(points: Points, ranges: Ranges) -> FloatArray:
-    """φ [P, m] within ±1 at points: smooth factors over every axis that a campaign varied, by which any template may be a
-    little wrong; beyond its range that at its end."""
+    """Factors φ [P, m] of the small error of any template at points, each within ±1, over every axis that a campaign
+    varied; beyond a campaign's range, their value at its end."""
     factors = [_cosines(points, _SMALL, ranges)]
     if ranges[Discrepancy.MOTION][1] > 0:
         turns = points.phase[:, None] * np.arange(1, 2 + 1)
@@ -153,7 +156,7 @@ def small_factors_at(points: Points, ranges: Ranges) -> FloatArray:
 
 
 def _cosines(points: Points, orders: Mapping[Discrepancy, int], ranges: Ranges) -> FloatArray:
-    """[P, m] of the orders 1 ... n along each axis that was varied."""
+    """Cosines [P, m] of the orders 1 ... n along each axis that was varied."""
     values, waves = _coordinates(points), [np.zeros((points.run.size, 0))]
     for along, most in orders.items():
         low, width = ranges[along]
@@ -164,7 +167,7 @@ def _cosines(points: Points, orders: Mapping[Discrepancy, int], ranges: Ranges) 
 
 
 def _coordinates(points: Points) -> dict[Discrepancy, FloatArray]:
-    """Where each point lies [P] on every axis along which an effect's form may be uncertain."""
+    """Coordinates [P] of the points on every axis along which an effect's form may be uncertain."""
     return {
         Discrepancy.SPEED: points.velocity,
         Discrepancy.PRESSURE: points.pressure,
@@ -175,13 +178,13 @@ def _coordinates(points: Points) -> dict[Discrepancy, FloatArray]:
 
 
 def discrepancy_factors(design: Design, effect: Effect) -> FloatArray:
-    """φ [N, m] at the rows of a campaign."""
+    """Factors φ [N, m] of an effect's own discrepancy at the rows of a campaign."""
     return factors_at(design.rows, effect, ranges_of(design.rows))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Draw:
-    """The effects at work (none: nothing is), beside these laws, and the draw's weight > 0."""
+    """A weighted draw of the posterior: the effects at work (none: nothing is) and the laws beside them."""
 
     weight: float
     laws: Laws

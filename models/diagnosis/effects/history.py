@@ -31,7 +31,7 @@ STATIC, WHOLE = 0.0, 1.0
 
 
 def _carried(scene: Scene, part: float) -> FloatArray:
-    """What a share is of [P] Nm: S, or M_s ∂S/∂M_s."""
+    """Torque [P] Nm to which a relative change applies: the whole curve S, or its static part M_s ∂S/∂M_s."""
     return scene.curve if part == WHOLE else scene.gradient[:, 0] * scene.parameters[:, 0]
 
 
@@ -179,7 +179,8 @@ def _load_severity_grid(facts: Facts) -> tuple[Tried, ...]:
 
 
 def effective_cycles(cycles: FloatArray, facts: Facts, exponent: float) -> FloatArray:
-    """ζ [n] as it counts for ageing: each engagement by (energy/usual energy)^exponent, usual where no energy was sent."""
+    """Cycles ζ [n] weighted by severity: each engagement counts (energy/usual energy)^exponent, 1 where no energy was
+    sent."""
     ends = np.concatenate([[0.0], facts.duty_ends])
     lengths = np.maximum(np.diff(ends), 0.0)
     usual = float(np.median(facts.duty_energies))

@@ -99,9 +99,9 @@ def _squeeze_film_changes(scene: Scene, settings: Sequence[tuple[float, Shape]])
 
 
 def _over_film(scene: Scene, looping: NDArray[np.intp], amplitude: FloatArray, shapes: FloatArray) -> FloatArray:
-    """Loops' points [n] by films [m]: w is the speed to which the present film belongs, ẇ = (v - w)(w/v_0 + f)^y/τ, a
-    step from phase to phase exact for a film whose time and a speed whose slope stay; asperities follow w, shear grows as
-    the film thins."""
+    """Change of torque [n, m] Nm at loops' points [n] by films [m]: w is the speed to which the present film belongs,
+    ẇ = (v - w)(w/v_0 + f)^y/τ, a step from phase to phase exact for a film whose time and a speed whose slope stay;
+    asperities follow w, shear grows as the film thins."""
     points, middle = scene.points, scene.laws.frame.reference_velocity
     power, thin, least, sheared = shapes[:4]
     slope = usual_slope(scene.laws, sheared)
@@ -133,8 +133,9 @@ def _over_film(scene: Scene, looping: NDArray[np.intp], amplitude: FloatArray, s
 
 
 def _over_thickness(scene: Scene, looping: NDArray[np.intp], amplitude: float, shape: Shape) -> FloatArray:
-    """Loops' points [n]: what h = (v/v_0 + f)^q lacks of its stationary value while it relaxes by τ, harmonic by harmonic;
-    asperities carry what the film does not, and carry more under pressure."""
+    """Torque [n] Nm, at loops' points, of a film of thickness h that lags its stationary thickness H = (v/v_0 + f)^q by
+    the time τ, harmonic by harmonic: strength · pressure · (H - h). Asperities carry the load that the film does not,
+    and carry more under pressure."""
     power, thin, least, time = shape[:4]
     points, middle = scene.points, scene.laws.frame.reference_velocity
     velocity, frequency = by_loop(points, looping)
@@ -147,8 +148,8 @@ def _over_thickness(scene: Scene, looping: NDArray[np.intp], amplitude: float, s
 
 
 def usual_slope(laws: Laws, sheared: FloatArray) -> FloatArray:
-    """-∂S/∂w [m] Nm s/m of films at rest with exponents `sheared` [m] of shear: the median over the usual swing, under the
-    loops' pressures, half through life. One number for one θ, whatever rows are asked for."""
+    """Usual slope -∂S/∂w [m] Nm s/m of films at rest with shear exponents `sheared` [m]: the median over the usual
+    swing, under the loops' pressures, half through life. It is one number for one θ, whatever rows are asked for."""
     frame = laws.frame
     swing = frame.reference_velocity * (1.0 - np.cos(2 * np.pi * (np.arange(_SWING) + 0.5) / _SWING))
     pressures = frame.loop_pressures if frame.loop_pressures.size else np.array([frame.lowest, frame.highest])
@@ -194,7 +195,7 @@ SQUEEZE_FILM = Effect(
 
 
 def _vibration(slug: str, title: str, amplitude: str, physics: str, check: str, formula: str, source: str) -> Effect:
-    """An effect that averages of plateaus and loops do not show."""
+    """A vibration effect, which averages of plateaus and loops do not show."""
     return Effect(
         slug=slug,
         title=title,

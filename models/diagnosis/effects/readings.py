@@ -87,7 +87,7 @@ def _torque_zero_shift_change(scene: Scene, amplitude: float, shape: Shape) -> F
 
 
 def _days_of(scene: Scene) -> FloatArray:
-    """The share [P] of the campaign's days that has gone; where a test was not timed, of its cycles."""
+    """Share [P] of the campaign's days that has passed; where a test was not timed, of its cycles."""
     facts, moment = scene.facts, scene.points.moment
     if facts.first_moment is None or facts.last_moment is None:
         return scene.life
@@ -151,7 +151,8 @@ def _pressure_offset_courses(facts: Facts) -> tuple[Tried, ...]:
 
 
 def _offsets(facts: Facts, growing: Sequence[Shape]) -> tuple[Tried, ...]:
-    """Constant; along the life, as probable together as the starts; from a cycle on."""
+    """The shape grid of an offset: constant; growing along the life, together as probable as the starts; from a cycle
+    on."""
     tried = [Tried(shape=(OFFSET_CONSTANT, 0.0, 0.0))]
     if facts.states.size > 2:
         tried += [Tried(shape=shape, log_weight=math.log(len(CREEPS) / len(growing))) for shape in growing]
@@ -171,7 +172,7 @@ def _pressure_offset_changes(scene: Scene, settings: Sequence[tuple[float, Shape
 
 
 def _pressure_offset_share(scene: Scene, shape: Shape) -> FloatArray:
-    """The share [P] of its size that the offset has."""
+    """Share [P] of the final pressure offset that is present at each point."""
     course, value, log_power = shape
     if course == OFFSET_CONSTANT:
         return np.ones_like(scene.points.cycles)
@@ -283,7 +284,7 @@ def _channel_delay_change(scene: Scene, amplitude: float, _shape: Shape) -> Floa
 
 
 def _shifted(curves: FloatArray, steps: FloatArray) -> FloatArray:
-    """Periodic curves [l, k] as they were `steps` [l, 1] phases before, by parabolas through the nearest three."""
+    """Periodic curves [l, k] delayed by `steps` [l, 1] phases, by parabolas through the nearest three."""
     whole_steps = np.round(steps)
     x = steps - whole_steps
     at = (np.arange(curves.shape[1]) - whole_steps.astype(np.intp)) % curves.shape[1]

@@ -46,7 +46,7 @@ _LOW, _HIGH = zero_Celsius + 40.0, zero_Celsius + 100.0
 
 
 def viscosity(temperature: FloatArray, oil: Oil) -> FloatArray:
-    """ν [n] m²/s at temperature [n] K > 0.
+    """Kinematic viscosity ν [n] m²/s at temperature [n] K > 0.
 
     >>> viscosity(np.array([353.15, 363.15]), Oil()).round(8).tolist()
     [1.49e-05, 1.163e-05]
@@ -58,7 +58,7 @@ def viscosity(temperature: FloatArray, oil: Oil) -> FloatArray:
 
 
 def log_viscosity_ratio(temperature: FloatArray, reference: float, oil: Oil) -> FloatArray:
-    """ln ν(T)/ν(reference) [n]; 0 where the temperature [n] K was not measured (NaN)."""
+    """Log viscosity ratio ln ν(T)/ν(reference) [n]; 0 where the temperature [n] K was not measured (NaN)."""
     return _log_viscosity_ratio(Same(temperature), reference, oil)
 
 
@@ -159,7 +159,7 @@ def _interface_heating_change(scene: Scene, amplitude: float, shape: Shape) -> F
 
 
 def _measured(scene: Scene, computed: FloatArray) -> FloatArray:
-    """The interface's warmth [P], by the plate's temperature where it was measured, else as computed."""
+    """Relative warmth [P] of the interface, from the plate's temperature where it was measured, else as computed."""
     rise, warming = scene.points.plate_rise, scene.facts.plate_warming
     if warming is None:
         return computed
@@ -169,7 +169,8 @@ def _measured(scene: Scene, computed: FloatArray) -> FloatArray:
 
 
 def _computed(scene: Scene, settling: float, saturation: float) -> FloatArray:
-    """The interface's warmth [P] by the flux of friction, saturating and settling in `settling` s; 1 at the reference's."""
+    """Relative warmth [P] of the interface from the heat flux of friction, saturating and settling in `settling` s; 1
+    at the reference flux."""
     geometry = scene.facts.geometry
     power = np.abs(scene.curve) * scene.points.velocity / geometry.mean_radius
     heat = power / (geometry.friction_faces * geometry.lining_area * REFERENCE_FLUX)

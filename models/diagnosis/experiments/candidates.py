@@ -33,7 +33,7 @@ Run = TypeVar("Run", StationaryRun, DynamicRun)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trial:
-    """What a test would be."""
+    """A test that the rig could make next: its settings and its description for the engineer."""
 
     text: str  # for the engineer, empty where it is only made as a part of others
     brief: str = ""  # the same in few words, where it has more than fit into a sentence
@@ -130,9 +130,9 @@ TRIALS: dict[str, Trial] = {
 
 
 def runs_of(key: str) -> float:
-    """How much work a trial is, in runs: pressures that were not tried before are as much as two more (none at all is not),
-    another oil temperature (hours of settling, and all changes that oil changes) as ten, a state of use as three,
-    unusual engagements as four, a pause as one."""
+    """The work of a trial, in equivalent runs: pressures that were not tried before are as much as two more (none at
+    all is not), another oil temperature (hours of settling, and all changes that oil changes) as ten, a state of use as
+    three, unusual engagements as four, a pause as one."""
     trial = TRIALS[key]
     if trial.parts:
         return sum(runs_of(part) for part in trial.parts)
@@ -142,8 +142,8 @@ def runs_of(key: str) -> float:
 
 
 def with_trial(campaign: Campaign, key: str) -> Campaign | None:
-    """The campaign with the trial's runs added at its end (torques 0), the first of those that are alike; None where the
-    campaign has no pattern for it."""
+    """The campaign with the trial's runs appended (torques 0), one of each group of equal repeats; None where the
+    campaign has no run to pattern the trial on."""
     trial = TRIALS[key]
     if trial.parts:
         extended: Campaign | None = campaign
@@ -185,8 +185,8 @@ def with_trial(campaign: Campaign, key: str) -> Campaign | None:
 
 
 def _usual(runs: Sequence[tuple[Run, Plateaus | Record]], trial: Trial) -> Run | None:
-    """The last run under the usual pressures, not one of those that a trial at light pressures or none has added; none where
-    the trial's share of its lowest pressure would leave the clutch open."""
+    """The last run under the usual pressures, excluding runs that a trial at light pressures or none has added; None
+    where the trial's share of its lowest pressure would leave the clutch open."""
     highest = max((float(table.pressure.max()) for _, table in runs), default=0.0)
     usual = [pattern for pattern in runs if max(0.75 * highest, UNLOADED) <= float(pattern[1].pressure.max())]
     if not usual:
@@ -197,7 +197,7 @@ def _usual(runs: Sequence[tuple[Run, Plateaus | Record]], trial: Trial) -> Run |
 
 
 def _sweep(pattern: StationaryRun, trial: Trial, cycles: float, number: int, rested: float) -> StationaryRun:
-    """The trial's test of that number, after so many seconds of pauses."""
+    """The trial's stationary test of that number, patterned on a run, after so many seconds of pauses."""
     table = pattern.plateaus
     levels = levels_of(table.pressure)
     rows = np.arange(table.torque.size)
@@ -225,7 +225,7 @@ def _sweep(pattern: StationaryRun, trial: Trial, cycles: float, number: int, res
 
 
 def _loops(pattern: DynamicRun, trial: Trial, cycles: float) -> DynamicRun:
-    """The pressures of a dynamic test, or a share of them, and its speeds, at another frequency."""
+    """The trial's dynamic test: a run's speeds and its pressures, or a share of them, at the trial's frequency."""
     record = pattern.record
     levels = np.unique(levels_of(record.pressure[:: max(1, record.pressure.size // 5000)]))
     levels = levels[levels >= UNLOADED]
@@ -321,6 +321,6 @@ def steps_of(campaign: Campaign, key: str) -> tuple[Step, ...]:
 
 
 def _in_order(values: FloatArray) -> tuple[float, ...]:
-    """The distinct values in the order in which they first come."""
+    """The distinct values in the order of their first occurrence."""
     _, first = np.unique(values, return_index=True)
     return tuple(float(value) for value in values[np.sort(first)])

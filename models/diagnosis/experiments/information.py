@@ -29,7 +29,7 @@ from models.diagnosis.pooled_fit.projection import Gram, gram_of, project
 
 
 class CandidateDistances:
-    """Distances of candidates, on what was measured and with rows to come."""
+    """Distances λ [nats] between candidates, on the measured rows and with rows to come."""
 
     def __init__(self, problem: FitProblem, fits: tuple[PooledFit, ...]) -> None:
         free = problem.priors.free.copy()
@@ -41,7 +41,7 @@ class CandidateDistances:
         self._measured = self._grams(problem, [fit.prediction for fit in fits])
 
     def ahead(self, added: Design) -> list[Gram]:
-        """What rows to come would show, candidate by candidate as the one to be distinguished from."""
+        """Gram matrices of rows to come, one for each candidate as the alternative that has to imitate the others."""
         predictions = [predict(added, fit.laws) for fit in self._fits]
         # rows to come have the noise of those measured at their torque
         steady = np.arange(added.torque.size) < added.plateaus
@@ -56,11 +56,12 @@ class CandidateDistances:
         return self._grams(FitProblem(design=added, noise=noise, priors=none, law=law), predictions)
 
     def distances(self, ahead: Sequence[list[Gram]]) -> FloatArray:
-        """λ [k, k] nats of each candidate (row), if it is true, against each other one (column), with runs to come."""
+        """Distances λ [k, k] nats with runs to come: of each candidate (row), if it is true, from each other one
+        (column)."""
         return self.with_freedom(ahead)[0]
 
     def with_freedom(self, ahead: Sequence[list[Gram]]) -> tuple[FloatArray, FloatArray]:
-        """The distances, and [k] nats of what the freedom of each candidate is worth: -½ ln det of all that it has free."""
+        """The distances [k, k] nats, and the complexity term -½ ln det [k] nats of each candidate's free parameters."""
         grams = self._measured
         for more in ahead:
             grams = [_joined(gram, added) for gram, added in zip(grams, more, strict=True)]
@@ -71,7 +72,8 @@ class CandidateDistances:
         return np.stack(columns, axis=1), np.array(freedom)
 
     def size_left(self, ahead: Sequence[list[Gram]]) -> float:
-        """The deviation of the size of the first candidate's first effect with runs to come, as a share of that without."""
+        """Ratio of the standard deviation of the first effect's amplitude, in the first candidate, with runs to come to
+        that without."""
         place = int(self._problem.priors.free.sum())
         gram, noise, deviations = self._measured[0], self._problem.noise, list[float]()
         for joined in (gram, reduce(_joined, [more[0] for more in ahead], gram)):
@@ -80,8 +82,8 @@ class CandidateDistances:
         return deviations[1] / max(deviations[0], 1e-300)
 
     def _grams(self, problem: FitProblem, predictions: Sequence[Prediction]) -> list[Gram]:
-        """What rows show of all candidates' differences from each, and of what that one can absorb; without priors where
-        they are added to others, which have them already."""
+        """Gram matrices of the rows, one for each candidate: all candidates' differences from it, and the columns by
+        which it can absorb them. Priors are left out for rows that are added to others, which have them already."""
         design, grams = problem.design, list[Gram]()
         torques = [_torque(design, at, fit) for at, fit in zip(predictions, self._fits, strict=True)]
         for fit, prediction, mine in zip(self._fits, predictions, torques, strict=True):
@@ -106,13 +108,13 @@ class CandidateDistances:
 
 
 def _torque(design: Design, prediction: Prediction, fit: PooledFit) -> FloatArray:
-    """[N] Nm of a candidate at the rows."""
+    """Torque [N] Nm of a candidate at the rows."""
     changes = [effect.rows(design, prediction) for effect in fit.effects]
     return np.asarray(prediction.torque + sum(changes, np.zeros_like(prediction.torque)), dtype=np.float64)
 
 
 def _joined(first: Gram, second: Gram) -> Gram:
-    """Of both designs' rows: runs are independent."""
+    """The Gram matrix of both designs' rows together: runs are independent."""
     most = max(first.along.shape[1], second.along.shape[1])
     missing = [((0, 0), (0, most - gram.along.shape[1]), (0, 0)) for gram in (first, second)]
     along = [np.pad(gram.along, pad) for gram, pad in zip((first, second), missing, strict=True)]
@@ -126,8 +128,8 @@ def _joined(first: Gram, second: Gram) -> Gram:
 
 
 def _noise_law(problem: FitProblem, torque: FloatArray) -> FloatArray:
-    """(a², b²) [2, 2] of plateaus and of loops, σ² = (a² + b² M²)/n as `noise.estimate` has it; a² is no less than
-    for noise at no torque of a fifth of the usual."""
+    """Noise coefficients (a², b²) [2, 2] of plateaus and of loops in σ² = (a² + b² M²)/n (`noise.estimate`); a² is at
+    least that of noise at a fifth of the usual torque."""
     design = problem.design
     steady = np.arange(design.torque.size) < design.plateaus
     variance = problem.noise.deviation**2 * design.samples

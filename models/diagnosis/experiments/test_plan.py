@@ -31,7 +31,8 @@ from models.diagnosis.pooled_fit.projection import Gram
 
 
 def rivals_of(judgement: Judgement) -> tuple[tuple[Fitted, ...], tuple[Fitted, ...]]:
-    """The candidates of the verdict, and the rivals of as many effects that are not far behind, best first."""
+    """The causes of the verdict's credible set, and further candidates of as many effects within 8 nats of the best,
+    best first."""
     if not judgement.stand:
         return (), ()
     best = judgement.stand[0]
@@ -71,8 +72,8 @@ class Advice:
 def advise(
     campaign: Campaign, problem: FitProblem, credible: Sequence[Fitted], nearby: Sequence[Fitted] = ()
 ) -> tuple[Advice, ...]:
-    """The trials that leave one of the credible candidates (best first), best trial first. Those nearby cannot be left, but
-    may become credible again."""
+    """Recommended trials, best first, by the probability that one of the credible candidates (best first) is left.
+    Those nearby are not to be left, but may become credible again."""
     race = [rival for rival in credible if rival.fit.effects]
     if not race:
         return ()
@@ -116,9 +117,9 @@ def advise(
 def _brought(
     before: tuple[FloatArray, FloatArray], after: tuple[FloatArray, FloatArray], evidences: FloatArray, racing: int
 ) -> tuple[float, int, float]:
-    """By distances and freedoms before and after a trial: the probability that one candidate is left (NaN where it cannot be
-    computed), the rival of the best that is hardest to distinguish from it, and the nats between them that the trial
-    brings."""
+    """Three results of a trial, from distances and freedoms before and after it: the probability that one candidate is
+    left (NaN where it cannot be computed), the index of the best candidate's rival that stays hardest to distinguish,
+    and the evidence [nats] between them that the trial brings."""
     count = evidences.size
     gained, change = np.maximum(after[0] - before[0], 0.0), after[1] - before[1]
     freedom = change[:count] - change[-1]
@@ -132,7 +133,8 @@ def _brought(
 
 
 def decided(gained: FloatArray, evidences: FloatArray, freedom: FloatArray) -> float:
-    """The probability that one candidate is left; of a single one, against no effect.
+    """The probability that a trial leaves one candidate; with a single candidate, that it is distinguished from no
+    effect.
 
     `gained` [k, k + 1] nats: what the trial brings for row against column (the last one no effect at all). `evidences` [k]
     nats over no effect. `freedom` [k] nats: how much each of them changes by the trial only because the candidate has more
@@ -150,8 +152,8 @@ def decided(gained: FloatArray, evidences: FloatArray, freedom: FloatArray) -> f
 
 
 def distinguished(nats: FloatArray, lead: FloatArray | float = 0.0) -> FloatArray:
-    """The probability that a candidate, if it is true, is left (SURE) against a rival that is behind by `lead` nats and
-    expected to fall behind by so many `nats` more."""
+    """The probability that a candidate, if it is true, reaches the odds of SURE against a rival that is behind by
+    `lead` nats and expected to fall behind by so many `nats` more."""
     odds = np.log(criteria.SURE / (1 - criteria.SURE))
     sd = np.sqrt(1.0 + 2.0 * nats + (0.4 * nats) ** 2)  # a predicted λ is off by 40 %
     return np.asarray(ndtr((lead + nats - odds) / sd), dtype=np.float64)
@@ -166,13 +168,14 @@ def _names(best: PooledFit, rival: PooledFit | None) -> tuple[str, str]:
 
 
 def bare(fit: PooledFit) -> PooledFit:
-    """Its baseline without the effects."""
+    """The fit's baseline without its effects."""
     return replace(fit, torque=fit.prediction.torque, effects=())
 
 
 def trials_of(campaign: Campaign, design: Design, distances: CandidateDistances) -> dict[str, list[list[Gram]]]:
-    """By trial what its runs would show, a run each; those that the campaign has a pattern for. Without a thermometer none
-    is made at another temperature, without a loop that could be evaluated no loop is predicted."""
+    """Gram matrices of rows to come, by trial key, a list for each of its runs; trials without a pattern in the
+    campaign are left out. Without a thermometer none is made at another temperature, without a loop that could be
+    evaluated no loop is predicted."""
     single = {}
     for key, trial in TRIALS.items():
         possible = design.facts.temperature_measured or trial.temperature is None
@@ -189,7 +192,8 @@ def trials_of(campaign: Campaign, design: Design, distances: CandidateDistances)
 
 
 def _thermometer(campaign: Campaign, problem: FitProblem, fits: Sequence[PooledFit]) -> list[Advice]:
-    """Where oil temperature was not measured and would be mistaken for a shifted zero: measure it, and change it.
+    """Advice to measure and change the oil temperature, where it was not measured and would be mistaken for a shifted
+    torque zero; else empty.
 
     What that brings is λ of a temperature effect of the usual size, which a shifted zero does not have.
     """
@@ -210,8 +214,8 @@ def _thermometer(campaign: Campaign, problem: FitProblem, fits: Sequence[PooledF
 
 
 def _added(campaign: Campaign, design: Design, key: str) -> Design | None:
-    """The rows of a trial's runs alone, if there are any; of the campaign's facts with the trial only those that do not
-    change what was fitted."""
+    """The design of a trial's runs alone, with the campaign's states and reference values; None where it has no
+    rows."""
     then = with_trial(campaign, key)
     if then is None:
         return None

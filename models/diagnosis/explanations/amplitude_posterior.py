@@ -28,7 +28,8 @@ _WIDE, _NEAR, _REACH = 401, 49, 8.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Proportional:
-    """All amplitudes, shapes and errors [m], amplitudes before the rest."""
+    """Normal approximation, at the fit, of the likelihood in all amplitudes, shapes and template errors [m], amplitudes
+    first."""
 
     info: FloatArray  # [m, m], without their priors
     score: FloatArray  # [m] likewise
@@ -37,11 +38,13 @@ class Proportional:
     effects: tuple[FittedEffect, ...]
 
     def log_integral(self) -> float:
-        """ln of the integral over all [nats], over √2π for an amplitude; of two the second as if all were normal."""
+        """ln of the integral of likelihood times priors over amplitudes, shapes and errors [nats], divided by √2π for
+        each amplitude. Of two amplitudes the second is integrated as if all were jointly normal."""
         return log_sum(self._along(np.full(len(self.effects), np.nan))[1])
 
     def amplitudes(self, count: int, rng: np.random.Generator) -> Iterator[FloatArray]:
-        """What is to be added to the fitted amplitudes [e]: `count` values of each, drawn from equally probable strata."""
+        """Draws of the amplitudes' deviations [e] from the fitted ones: `count` values of each amplitude given the ones
+        before it, from equally probable strata, count^e draws in all."""
         open_ = [np.full(len(self.effects), np.nan)]
         for place in range(len(self.effects)):
             further = []
@@ -57,12 +60,14 @@ class Proportional:
         return iter(open_)
 
     def ratio(self, given: FloatArray) -> FloatArray:
-        """By how much [m] everything acts more than at the fit where these are added to the amplitudes (not known: NaN)."""
+        """Ratio a/a_f [m] of each parameter's effect, a the fitted amplitude a_f plus `given`; 1 for the amplitudes
+        themselves and where `given` is NaN (not known)."""
         fitted = np.array([effect.amplitude for effect in self.effects])
         return np.where(np.isinf(self.sd), 1.0, np.where(np.isnan(given), 1.0, 1.0 + given / fitted)[self.of])
 
     def normal(self, given: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Mean [m] and root [m, m] of the covariance of all where these are added to the amplitudes."""
+        """Conditional mean [m] and root [m, m] of the covariance of all parameters, given the deviations of the
+        amplitudes from the fitted ones."""
         info, score = self._beside(given)
         mean, root = np.zeros(score.size), np.zeros(info.shape)
         mean[np.isinf(self.sd)] = given
@@ -74,13 +79,15 @@ class Proportional:
         return mean, root
 
     def _beside(self, given: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Information and score where these are added to the amplitudes (not known: NaN)."""
+        """Information [m, m] and score [m] of all parameters, given the deviations of the amplitudes from the fitted
+        ones (NaN: not known)."""
         ratio, step = self.ratio(given), np.zeros(self.sd.size)
         step[np.isinf(self.sd)] = np.nan_to_num(given)
         return self.info * ratio[:, None] * ratio, (self.score - self.info @ step) * ratio
 
     def _along(self, given: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Steps [n] along the first amplitude that is not known, and logs [n] of the parts of the integral there [nats]."""
+        """Deviations [n] of the first amplitude that is not `given`, as nodes of a quadrature, and the log of the
+        integral's part at each node [n] [nats]."""
         place = int(np.flatnonzero(np.isnan(given))[0])
         info, score = self._beside(given)
         at_work = self.sd > 0
@@ -103,8 +110,8 @@ class Proportional:
 def _along_amplitude(
     info: FloatArray, score: FloatArray, sd: FloatArray, fitted: FittedEffect
 ) -> tuple[FloatArray, FloatArray]:
-    """Steps [n] from the fitted amplitude, and logs [n] of the parts of the integral there [nats]; info, score of (a, c) and
-    sd > 0 of c."""
+    """Deviations [n] from the fitted amplitude, as nodes of a quadrature, and the log of the integral's part at each
+    node [n] [nats]; info and score are those of (a, c), sd > 0 those of c."""
     values, vectors = independent(sd[:, None] * info[1:, 1:] * sd)
     fixed, sloped = vectors.T @ (sd * score[1:]), vectors.T @ (sd * info[1:, 0])
     # a jointly normal (a, c), and the exact template beside it; rounding aside no less than the amplitude's own prior

@@ -20,7 +20,7 @@ TORQUE_WAVES, SPEED_WAVES = 20, range(4, 17)
 
 
 def contrasts_of(design: Design, prediction: Prediction) -> tuple[FloatArray, list[str]]:
-    """Every contrast that the design can show: columns [N, m] Nm at the rows, and the axis [m] on which each lives."""
+    """All contrasts that the design can show: columns [N, m] Nm at the rows, and the axis [m] on which each depends."""
     rows = design.rows
     torque = rows.engaged * np.abs(prediction.torque)  # with the clutch open there is no friction to be wrong
     steady = rows.steady.astype(np.float64)
@@ -88,7 +88,7 @@ def contrasts_of(design: Design, prediction: Prediction) -> tuple[FloatArray, li
 
 
 def _ripples(design: Design, prediction: Prediction) -> FloatArray:
-    """Columns [N, m] Nm of friction that ripples over speed, which loops show with its lag."""
+    """Contrasts [N, m] Nm of friction that ripples over speed, with the loops' lag."""
     points, friction = design.points, np.abs(prediction.scene.curve)
     even = _unit(points.velocity, points.engaged > 0)
     shapes = np.stack([wave(np.pi * s * even) for s in SPEED_WAVES for wave in (np.cos, np.sin)], axis=1)
@@ -105,12 +105,12 @@ def _cosine(order: int, unit: FloatArray) -> FloatArray:
 
 
 def _unit(values: FloatArray, among: NDArray[np.bool_]) -> FloatArray:
-    """To 0 ... 1 by the range of those `among` them."""
+    """Values [n] scaled to 0 ... 1 by the range of the selected ones (`among`), clipped to it."""
     low, high = float(values[among].min()), float(values[among].max())
     return (np.clip(values, low, high) - low) / max(high - low, 1e-300)
 
 
 def _rank(values: FloatArray) -> FloatArray:
-    """To 0 ... 1 by rank of the distinct values: states crowd early in life."""
+    """Values [n] scaled to 0 ... 1 by the rank of the distinct values: states crowd early in life."""
     distinct = np.unique(values)
     return np.searchsorted(distinct, values) / max(distinct.size - 1, 1)

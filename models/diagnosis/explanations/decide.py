@@ -30,8 +30,8 @@ from models.diagnosis.explanations.verdict import (
 
 
 def explanations_of(posterior: Posterior) -> tuple[Explanation, ...]:
-    """The list in public terms, most probable first: everything without a name is `uncatalogued`; vibrations are at work or
-    not beside each alternative."""
+    """Explanations with their probabilities, most probable first, in public terms: everything without a name is
+    `uncatalogued`, and each alternative is split by which vibrations are at work beside it."""
     shares = dict[tuple[str, ...], float]()
     for alternative, share in posterior.probabilities.items():
         for at_work in product((False, True), repeat=len(posterior.vibrations)):
@@ -46,7 +46,7 @@ def explanations_of(posterior: Posterior) -> tuple[Explanation, ...]:
 
 
 def decide(explanations: Sequence[Explanation]) -> tuple[Verdict, tuple[str, ...]]:
-    """The verdict and its causes; UNCATALOGUED may stand among those of an ambiguous one."""
+    """The verdict and the slugs of its causes; UNCATALOGUED may be among the causes of an ambiguous verdict."""
     shares = {explanation.effects: explanation.probability for explanation in explanations}
     nothing = shares.get((), 0.0)
     if nothing >= criteria.LIKELY:
@@ -62,7 +62,8 @@ def decide(explanations: Sequence[Explanation]) -> tuple[Verdict, tuple[str, ...
 
 
 def smallest(shares: Mapping[tuple[str, ...], float]) -> list[tuple[str, ...]]:
-    """The fewest explanations, most probable first, that hold SURE of what is not nothing."""
+    """The credible set: the fewest explanations, most probable first, that hold SURE of the probability that anything
+    is at work."""
     chosen, mass = list[tuple[str, ...]](), 0.0
     something = 1.0 - shares.get((), 0.0)
     for effects, share in sorted(shares.items(), key=lambda item: -item[1]):
@@ -75,7 +76,7 @@ def smallest(shares: Mapping[tuple[str, ...], float]) -> list[tuple[str, ...]]:
 
 
 def judge(posterior: Posterior) -> Judgement:
-    """The judgement before validation: the verdict, and what was fitted behind it."""
+    """The judgement before validation: the verdict, the probabilities of the explanations, and the fits behind them."""
     explanations = explanations_of(posterior)
     verdict, causes = decide(explanations)
     fitted = _fitted(posterior)
@@ -104,7 +105,7 @@ def judge(posterior: Posterior) -> Judgement:
 
 
 def _fitted(posterior: Posterior) -> tuple[Fitted, ...]:
-    """The causes that were fitted, alone and in pairs, most probable first."""
+    """The refitted causes, alone and in pairs, most probable first."""
     named = [
         alternative
         for alternative in posterior.nodes
@@ -121,7 +122,7 @@ def _fitted(posterior: Posterior) -> tuple[Fitted, ...]:
 
 
 def _where(evidence: Mapping[str, float]) -> tuple[Where, ...]:
-    """The axes on which what has no name lies, by the most of its evidence [nats]."""
+    """The axes of unexplained structure, each with the largest evidence [nats] of its alternatives, largest first."""
     axes: dict[str, float] = {}
     for unknown, value in evidence.items():
         if axis := axis_of(unknown):

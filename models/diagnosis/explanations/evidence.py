@@ -30,7 +30,8 @@ from models.gaussian_evidence import independent, log_gain, log_gain_alone, log_
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Evidence:
-    """About one fit [nats, up to one constant]."""
+    """Log marginal likelihood about one fit [nats, up to one constant], with isolability, smooth structure and
+    projections beside it."""
 
     whole: float  # with the templates' errors
     isolability: tuple[float, ...]  # ι of each effect, beside the sizes of the law that are likely here
@@ -43,8 +44,8 @@ class Evidence:
 def evidence_of(
     problem: FitProblem, fitted: PooledFit, beside: FloatArray | None = None, *, smooth: bool = True
 ) -> Evidence:
-    """The evidence about a fit, with changes [N, m] Nm `beside` it projected for the screen of one thing more, and smooth
-    structure beside it unless not wanted."""
+    """The evidence about a fit, with smooth structure unless `smooth` is false; changes [N, m] Nm `beside` it are
+    projected for the screen of one further effect."""
     design = problem.design
     nothing = np.zeros((design.torque.size, 0))
     contrasts, lies = visible_contrasts(problem, fitted) if smooth else (nothing, [])
@@ -88,8 +89,8 @@ def evidence_of(
 
 
 def _isolability(problem: FitProblem, fitted: PooledFit, likely: Projected) -> tuple[float, ...]:
-    """ι of each effect as it was fitted, beside the baseline without effects: whether something is at work there, not how
-    well its amplitude is known."""
+    """Isolability ι of each fitted effect beside the baseline without effects: it measures whether an effect is at
+    work, not how well its amplitude is known."""
     if not fitted.effects:
         return ()
     changes = np.stack([effect.rows(problem.design, fitted.prediction) for effect in fitted.effects], axis=1)
@@ -99,8 +100,8 @@ def _isolability(problem: FitProblem, fitted: PooledFit, likely: Projected) -> t
 
 
 def visible_contrasts(problem: FitProblem, fitted: PooledFit) -> tuple[FloatArray, list[str]]:
-    """The contrasts [N, m] Nm, with their axes, of which most is visible beside a law that is off by USUAL_LAW: what is not
-    is a difference of the law, and the law has it already."""
+    """The isolable contrasts [N, m] Nm, with their axes: ι >= ISOLABLE beside a law's discrepancy of USUAL_LAW. The
+    other contrasts are differences of the law, which the law's discrepancy covers already."""
     contrasts, axes = contrasts_of(problem.design, fitted.prediction)
     if problem.law is None or not axes:
         return contrasts, axes
@@ -109,8 +110,8 @@ def visible_contrasts(problem: FitProblem, fitted: PooledFit) -> tuple[FloatArra
 
 
 def template_errors(design: Design, fitted: PooledFit) -> tuple[list[FloatArray], FloatArray]:
-    """By effect the factors φ [N, m] at the rows with which it may be off, and over all effects [Σ m] 1 for those in which
-    an effect's form is uncertain by itself, 0 for the others."""
+    """Factors φ [N, m] of each effect's template error at the rows, and over all effects [Σ m] a 1 for each factor of
+    the effect's own discrepancy, a 0 for the small ones that every template has."""
     small = small_factors_at(design.rows, ranges_of(design.rows))
     uncertain = [discrepancy_factors(design, effect.effect) for effect in fitted.effects]
     uncertain_by_itself = [np.repeat([1.0, 0.0], [factors.shape[1], small.shape[1]]) for factors in uncertain]
@@ -120,14 +121,16 @@ def template_errors(design: Design, fitted: PooledFit) -> tuple[list[FloatArray]
 
 
 def off_by(design: Design, fitted: PooledFit, factors: Sequence[FloatArray]) -> FloatArray:
-    """The changes [N, Σ m] Nm by every factor [N, m] with which the effects may be off."""
+    """Changes of torque [N, Σ m] Nm by the effects' template errors: each effect's change times each of its factors
+    [N, m]."""
     rows = [effect.rows(design, fitted.prediction) for effect in fitted.effects]
     changes = [change[:, None] * effect_factors for change, effect_factors in zip(rows, factors, strict=True)]
     return np.concatenate([np.zeros((design.torque.size, 0)), *changes], axis=1)
 
 
 def _averaged(projected: Projected, wrong: slice, own: FloatArray, sizes: Sequence[tuple[float, float]]) -> float:
-    """What the templates' errors add [nats], averaged over their sizes (in what a form is uncertain in, in all else)."""
+    """Log Bayes factor [nats] of the templates' errors, averaged over pairs of prior deviations (of an effect's own
+    discrepancy, of the small errors of every template)."""
     if not own.size:
         return 0.0
     info, score = projected.info[wrong, wrong], projected.score[wrong]
@@ -135,7 +138,8 @@ def _averaged(projected: Projected, wrong: slice, own: FloatArray, sizes: Sequen
 
 
 def structure_gain(info: FloatArray, score: FloatArray) -> float:
-    """What smooth structure adds [nats], averaged over its size, all contrasts together or one of them alone."""
+    """Log Bayes factor [nats] of smooth structure over none, averaged over its size and over all contrasts together or
+    one of them alone."""
     values, vectors = independent(info)
     sizes = np.array(criteria.CONTRAST_SIZES)[:, None]
     together = log_gain_alone(values, vectors.T @ score, sizes).sum(axis=1)
@@ -144,7 +148,7 @@ def structure_gain(info: FloatArray, score: FloatArray) -> float:
 
 
 def _likeliest(projected: Projected, mine: FloatArray) -> FloatArray:
-    """The likeliest coefficients of smooth structure, at the size that suits it best."""
+    """Posterior mean coefficients [k] of smooth structure, at the size of highest evidence."""
     values, vectors = independent(projected.info[np.ix_(mine, mine)])
     score = vectors.T @ projected.score[mine]
     size = max(criteria.CONTRAST_SIZES, key=lambda size: float(log_gain_alone(values, score, size).sum()))
@@ -152,16 +156,16 @@ def _likeliest(projected: Projected, mine: FloatArray) -> FloatArray:
 
 
 def _log_prior(fitted: PooledFit) -> float:
-    """The normalisation of the priors of the effects' amplitudes and smooth shapes [nats]. An amplitude of one sign has all
-    of its prior there; one at its bound has one side of it, which `_beside_bounds` counts twice."""
+    """Log normalisation of the priors of the effects' amplitudes and smooth shapes [nats]. An amplitude of one sign has
+    all of its prior there; one at its bound has one side of it, which `_beside_bounds` counts twice."""
     logs = [e.effect.log_amplitude_peak + 0.5 * float(np.log(e.precisions[1:]).sum()) for e in fitted.effects]
     halves = sum(int(e.effect.positive) - int(not e.free[0]) for e in fitted.effects)
     return sum(logs) + float(np.log(2.0)) * halves
 
 
 def _held_at_bounds(gram: Gram, first: int, fitted: PooledFit) -> tuple[Gram, FloatArray]:
-    """The Gram matrix with what is at a bound before the changes [h], and which way is out for each [h] ±1; the effects'
-    columns begin at `first`."""
+    """The Gram matrix with the columns of the parameters [h] that are at a bound moved from the baseline to the head of
+    the changes, and the outward direction ±1 at each bound [h]. The effects' columns begin at `first`."""
     ways: list[float] = []  # 0 for what is free
     for effect in fitted.effects:
         smooth = effect.effect.smooth(effect.shape)
@@ -181,8 +185,9 @@ def _held_at_bounds(gram: Gram, first: int, fitted: PooledFit) -> tuple[Gram, Fl
 
 
 def _beside_bounds(projected: Projected, held: slice, outward: FloatArray) -> float:
-    """What lies at a bound adds [nats]: all of its prior lies on one side, and where the data ask for values beyond,
-    it falls off there (twice the half of a normal one that it would be where they do not)."""
+    """Log integral [nats] over the parameters at a bound, ∫ e^{-gt - ht²/2} dt for each over its inner side, scaled to
+    that of a normal: all of the prior lies on one side, and where the data ask for values beyond the bound, the
+    posterior falls off from there."""
     info = np.maximum(np.diag(projected.info)[held], 1e-300)
     slope = np.maximum(outward * projected.score[held], 0.0) / np.sqrt(2 * info)
     return float((np.log(erfcx(slope)) - 0.5 * np.log(info)).sum())

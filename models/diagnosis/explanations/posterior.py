@@ -51,7 +51,7 @@ from models.gaussian_evidence import log_gain_alone, log_positive, log_sum
 
 
 class Start(NamedTuple):
-    """A kind of an effect's shapes."""
+    """A start of a refit: one kind of an effect's shapes, with its promise and its linear fit."""
 
     promise: float  # [nats], its prior included
     column: Column  # its best
@@ -60,13 +60,13 @@ class Start(NamedTuple):
 
 
 def screen_of(projected: Projected) -> Screened:
-    """What was screened; nothing where no column was."""
+    """Information and score of the screened columns of a projection; empty arrays where no column was screened."""
     none = np.zeros(0)
     return projected.screened or Screened(info=none, score=none, whole=none)
 
 
 def starts(columns: Sequence[Column], screened: Sequence[Projected]) -> dict[str, list[Start]]:
-    """The kinds of shapes of each effect, best first."""
+    """Starts for refits by effect slug, one for each kind of the effect's shapes, of highest promise first."""
     if not columns:
         return {}
     sd = np.array([column.effect.prior_sd for column in columns])
@@ -105,7 +105,7 @@ Key: TypeAlias = tuple[Alternative, Kinds]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Node:
-    """An alternative that was refitted."""
+    """A refitted alternative: its fit and its log evidence [nats]."""
 
     fit: PooledFit
     evidence: Evidence
@@ -115,13 +115,14 @@ class Node:
 
     @property
     def kind(self) -> Kinds:
-        """The shapes that a refit does not move."""
+        """The kind of the effects' shapes, by slug: the values of the shapes that a refit does not move."""
         return tuple(sorted((e.effect.slug, e.effect.stiff(e.shape)) for e in self.fit.effects))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Posterior:
-    """What the search found."""
+    """Result of the search: the alternatives' log weights, the refits behind them, probabilities of vibrations and
+    isolabilities."""
 
     weights: Mapping[Alternative, float]  # log weights [nats] over nothing, prior included
     nodes: Mapping[Alternative, Node]  # the best one of each alternative that was refitted
@@ -137,12 +138,12 @@ class Posterior:
 
     @property
     def null(self) -> Node:
-        """Nothing at work."""
+        """The node of the alternative that nothing is at work."""
         return self.nodes[NOTHING]
 
     @property
     def probabilities(self) -> dict[Alternative, float]:
-        """They sum to one; the most probable first."""
+        """Probabilities of the alternatives, most probable first; they sum to one."""
         total = log_sum(list(self.weights.values()))
         ranked = sorted(self.weights.items(), key=lambda item: -item[1])
         return {alternative: float(np.exp(weight - total)) for alternative, weight in ranked}
@@ -150,8 +151,9 @@ class Posterior:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Prior:
-    """Log prior odds against nothing at work: ANYTHING_WRONG that anything is, UNCATALOGUED_SHARE of it nothing of the
-    catalogue, and as probable a second thing beside the first; evenly within each."""
+    """Log prior odds of an alternative against nothing at work. ANYTHING_WRONG is the probability that anything is,
+    UNCATALOGUED_SHARE of it for causes outside the catalogue; a second cause beside the first is as probable again;
+    within each the odds are even."""
 
     effects: int
     unknowns: int
@@ -174,14 +176,16 @@ class Prior:
 
 
 class Lead(NamedTuple):
-    """The most that a refit has brought, and its cost under the search's noise: what others must come near to."""
+    """The highest log evidence that a refit has reached [nats], and the fit's cost under the search's noise; other
+    refits must come near to both."""
 
     log_evidence: float
     cost: float
 
 
 class Search:
-    """The nodes and what else is promised, as the search goes on."""
+    """State of the search: refitted nodes by alternative, and the alternatives that wait for a refit, with their
+    promised log weights."""
 
     def __init__(self, baseline: Baseline, raw: Sequence[RawEvidence], without: frozenset[str]) -> None:
         facts = baseline.problem.design.facts
@@ -219,11 +223,12 @@ class Search:
 
     @property
     def null(self) -> Node:
-        """Nothing at work."""
+        """The node of the alternative that nothing is at work."""
         return self.nodes[NOTHING][0]
 
     def run(self) -> None:
-        """Add to what leads, then try it without each of its parts, until what leads was tried so already."""
+        """Runs the search: refits single causes, adds effects to promising alternatives, then tries the leader without
+        each of its parts; ends once the leader has been reduced already."""
         reduced = set[Alternative]()
         self._single()
         while True:
@@ -237,7 +242,8 @@ class Search:
             self._down(leader)
 
     def weights(self) -> dict[Alternative, float]:
-        """Log weights of everything about the nodes: themselves, and structure beside them."""
+        """Log weights (log prior + log evidence) [nats] of the refitted alternatives, and of smooth structure beside
+        single causes or nothing as it was screened there."""
         out: dict[Alternative, float] = {}
         for alternative, nodes in self.nodes.items():
             out[alternative] = self._evidence(alternative) + self.prior(alternative)
@@ -253,7 +259,8 @@ class Search:
         return out
 
     def _evidence(self, alternative: Alternative) -> float:
-        """Log evidence over the kinds of shapes: of those refitted, and the others in proportion to what they promise."""
+        """Log evidence of an alternative over all its kinds of shapes [nats]: refitted kinds by their evidence, the
+        others in proportion to their promises."""
         nodes = self.nodes[alternative]
         value = log_sum([node.log_evidence for node in nodes])
         left = [promise for (other, _), (promise, _, _) in self._promises.items() if other == alternative]
@@ -283,8 +290,8 @@ class Search:
             self._take(max(able, key=lambda key: self._hope(key, leader, 0.0)))
 
     def _single(self) -> None:
-        """Each single cause whose best kind is promised to be more probable than nothing: a loud one may be a hundred nats
-        better than it was screened, for the screen is linear about a baseline that has absorbed a part of it."""
+        """Refits each single cause whose best kind has a promise above nothing at work: a strong cause may be a hundred
+        nats better than its promise, because the screen is linear about a baseline that has absorbed a part of it."""
         best: dict[Alternative, Key] = {}
         for key, (promise, _, _) in sorted(self._promises.items(), key=lambda item: item[1][0]):
             if len(key[0].causes) == 1 and not key[0].unknown and promise > self.null.log_evidence:
@@ -293,7 +300,8 @@ class Search:
             self._take(key)
 
     def _screen(self, alternatives: set[Alternative]) -> None:
-        """What smooth structure and the catalogue promise beside single causes, or nothing, that were refitted."""
+        """Screens smooth structure and one further effect about the best node of each given alternative (a single
+        cause, or nothing), and records their promises."""
         for alternative in sorted(alternatives):
             first, *other_nodes = self.nodes[alternative]
             evidence = evidence_of(self.problem, first.fit, self._changes)
@@ -303,7 +311,7 @@ class Search:
         self._unscreened -= alternatives
 
     def _take(self, key: Key) -> None:
-        """Refit what was promised."""
+        """Refits a promised alternative, about the node that promised it, and removes the promise."""
         promise, parent, start = self._promises.pop(key)
         self.refits += 1
         if start is None:
@@ -315,9 +323,9 @@ class Search:
             self._failed.add(key[0])
 
     def _hope(self, key: Key, leader: Alternative, slack: float) -> float:
-        """A promise, with what refits of other kinds of the alternative brought beyond theirs or fell short of them; where
-        none was refitted yet and it explains what the leader does in another way, with a share `slack` of what the leader
-        explains more than the parent about which it was promised."""
+        """The log weight [nats] hoped for from a refit: the promise plus the best surplus of refits of the
+        alternative's other kinds over their promises. If none was refitted yet and the alternative competes with the
+        leader, a share `slack` of the leader's gain over the promise's parent is added instead."""
         alternative, (promise, parent, _) = key[0], self._promises[key]
         beyond = [n.log_evidence + self.prior(alternative) - n.promise for n in self.nodes.get(alternative, [])]
         if beyond:
@@ -327,7 +335,7 @@ class Search:
         return promise + (0.0 if adds_to_leader else slack * more)
 
     def _down(self, leader: Alternative) -> None:
-        """The leader with one thing less, from where it has the rest."""
+        """Refits the leader without each of its parts in turn, starting from the leader's fit."""
         node = self.nodes[leader][0]
         places = [None] if is_axis(leader.unknown) else range(len(node.fit.effects))
         fewer = set[Alternative]()
@@ -348,7 +356,8 @@ class Search:
         shape_evidence: tuple[float, ...],
         promise: float,
     ) -> None:
-        """One refit more of an alternative; the better one of each kind of shapes is kept."""
+        """Refits an alternative once more and stores the node; of nodes with one kind of shapes the better one is
+        kept."""
         # beside a loud cause the law's form goes as far as its sizes allow, and bends eq. 3 along: from there a refit with
         # the cause may end elsewhere
         laws = (start.laws, self._exact)[: 2 if len(effects) == 1 else 1]
@@ -374,13 +383,14 @@ class Search:
             self._unscreened.add(alternative)
 
     def _suiting(self, node: Node) -> FitProblem:
-        """The problem with the sizes of the law that are likeliest beside a node."""
+        """The problem with the sizes of the law's discrepancy that have the highest evidence beside a node."""
         likely = max(node.evidence.screened, key=lambda projected: projected.evidence)
         return self.problem.with_noise(replace(self.problem.noise, law=likely.sizes))
 
     def _add_structure(self, alternative: Alternative, parent: Node, promise: float) -> None:
-        """Add structure on an axis (`alternative.unknown`) beside a parent explanation. The baseline is refitted with the
-        likeliest form of the structure taken off; `promise` is the log evidence [nats] that was expected."""
+        """Adds smooth structure on an axis (`alternative.unknown`) beside a parent explanation. The baseline is
+        refitted with the likeliest form of the structure taken off; `promise` is the log evidence [nats] that was
+        expected."""
         axis = alternative.unknown
         fitted = refit_beside(self._suiting(parent), parent.fit, parent.evidence.patterns[axis])
         node = None if fitted is None else self._node(fitted, alternative.causes, parent.shape_evidence, smooth=True)
@@ -397,7 +407,7 @@ class Search:
         *,
         smooth: bool = False,
     ) -> Node | None:
-        """A fit with its evidence."""
+        """A node from a fit, with its evidence; None where the evidence is not finite."""
         evidence = evidence_of(self.problem, fitted, beside, smooth=smooth)
         value = evidence.whole + sum(shape_evidence)
         if not np.isfinite(value):
@@ -407,11 +417,13 @@ class Search:
         return Node(fit=fitted, evidence=evidence, shape_evidence=shape_evidence, log_evidence=value, promise=value)
 
     def _by_raw(self, causes: Sequence[str], gained: float) -> float:
-        """What raw records add [nats] to effects beyond what averages of the same samples show of them."""
+        """Log evidence [nats] of raw records for the causes beyond `gained`, the gain [nats] that averages of the same
+        samples show already."""
         return sum(max(self._raw.get(slug, 0.0) - max(gained, 0.0), 0.0) for slug in causes)
 
     def _promise(self, parent: Alternative, node: Node) -> None:
-        """What the screen about a node promises of everything with one thing more; the larger promise stands."""
+        """Records the log weight [nats] that the screen about a node promises for the node's alternative with each
+        further effect or axis of structure; an earlier, larger promise stays."""
         promises: dict[Key, tuple[float, Node, Start | None]] = {}
         for slug, kinds in starts(self._columns, node.evidence.screened).items():
             more = parent.and_effect(slug)
@@ -433,8 +445,9 @@ class Search:
                 self._promises[key] = promise
 
     def posterior(self, raw: Sequence[RawEvidence], without: frozenset[str]) -> Posterior:
-        """The list as far as it was searched; what was not refitted counts as it was screened
-        about the likeliest parent, no more than what was refitted; a refit that failed excludes it."""
+        """The posterior over all alternatives as far as they were searched. Alternatives that were not refitted have
+        their screened weight about the likeliest parent, at most that of the best refitted one; an alternative whose
+        refit failed is left out."""
         weights = self.weights()
         most = max(weights.values())
         for alternative, (_, promised) in self._nearest.items():
@@ -480,7 +493,7 @@ class Search:
         )
 
     def _isolabilities(self) -> dict[Alternative, dict[str, float]]:
-        """ι of the effects of each alternative that was refitted, by slug."""
+        """Isolability ι of the effects of each refitted alternative, by slug."""
         return {
             alternative: {
                 effect.effect.slug: share
@@ -490,7 +503,7 @@ class Search:
         }
 
     def _screened_isolability(self) -> dict[str, float]:
-        """ι of each effect that was screened, by slug, in the shape that the data like best where nothing is at work."""
+        """Isolability ι of each screened effect, by slug, in its shape of highest promise beside nothing at work."""
         screened = self.null.evidence.screened
         best = {slug: kinds[0].column for slug, kinds in starts(self._columns, screened).items()}
         places = [next(k for k, column in enumerate(self._columns) if column is one) for one in best.values()]
@@ -502,8 +515,8 @@ class Search:
 def isolable(
     weights: Mapping[Alternative, float], isolabilities: Mapping[Alternative, Mapping[str, float]]
 ) -> tuple[dict[Alternative, float], dict[str, float]]:
-    """Log weights of the explanations [nats] whose causes can all be told from the law's form, and by cause the probability
-    that was counted as the law's.
+    """Log weights [nats] of the explanations after causes that cannot be told from the law's form were merged into the
+    explanation without them, and by cause the probability that was counted as the law's.
 
     A cause of which less than ISOLABLE is left beside the law's discrepancy is the law's: its explanation counts as the same
     without it, the least isolable first, and what is then left by its own ι (`isolabilities`, by explanation and slug). An
@@ -529,8 +542,8 @@ def isolable(
 
 
 def _shown(problem: FitProblem, fitted: PooledFit, columns: Sequence[Column]) -> tuple[list[Column], FloatArray]:
-    """The columns of effects that change a reading, with their changes [N, m]: without loops no delay does, without a clock
-    no drift along it."""
+    """The columns of effects that change any reading, with their changes [N, m] Nm: a delay changes nothing without
+    loops, a drift nothing without a clock."""
     changes = columns_at_rows(problem.design, fitted.prediction, columns)
     shown = {column.effect.slug for column, change in zip(columns, changes.T, strict=True) if change.any()}
     is_shown = [column.effect.slug in shown for column in columns]

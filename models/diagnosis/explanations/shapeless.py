@@ -50,22 +50,24 @@ _FEWEST_IN_A_RUN = 32
 
 
 def line_evidence(p_value: float) -> float:
-    """What the p-value of the highest line is worth at most [nats], 1/(-e p ln p) (Sellke, Bayarri and Berger, Am. Stat. 55
-    (2001) 62)."""
+    """Upper bound of the log Bayes factor [nats] of a line from the p-value of the highest one, 1/(-e p ln p) (Sellke,
+    Bayarri and Berger, Am. Stat. 55 (2001) 62)."""
     rare = -float(np.log(max(p_value, 1e-300)))
     return rare - 1.0 - float(np.log(rare)) if rare > 1.0 else 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Run:
-    """Times [n] s from the run's start, pauses cut short; whitened residual [n] without the gain; weights m [n, 2]."""
+    """The plateaus of one run as a time series: times [n] s from its start, pauses cut short; whitened residual [n]
+    without the gain; weights m [n, 2]."""
 
     time: FloatArray
     left: FloatArray
     weights: FloatArray
 
     def power(self, first: int, last: int, spacing: float) -> FloatArray:
-        """[last - first, 2] at angular frequencies `spacing` [rad/s] times first ... last - 1."""
+        """Spectral power P(ω) [last - first, 2] at angular frequencies `spacing` [rad/s] times first ... last - 1, for
+        each of the two weights."""
         wave, step = np.exp(-1j * first * spacing * self.time), np.exp(-1j * spacing * self.time)
         sums, weighed = np.empty((last - first, 2), dtype=np.complex128), self.left[:, None] * self.weights
         for k in range(last - first):
@@ -75,8 +77,9 @@ class _Run:
 
 
 def highest_line(problem: FitProblem, residual: FloatArray) -> float:
-    """The p-value of the highest line in a residual [N] Nm, summed over the runs, among all that were looked at. The likely
-    gains of curves are to be taken out before: at one pressure after the other they are steps at even times."""
+    """The p-value of the highest spectral line in a residual [N] Nm, power summed over the runs, corrected for all the
+    frequencies searched. The likely gains of curves are to be taken out before: at one pressure after the other they
+    are steps at even times."""
     runs = _runs(problem.design, problem.noise, residual)
     longest = max((run.time.size for run in runs), default=0)
     if sum(run.time.size for run in runs) < 64 or longest < _FEWEST_IN_A_RUN:
@@ -130,7 +133,7 @@ _BENT_BETWEEN, _LOUD = 4, 5.0
 
 
 def outlying_run(problem: FitProblem, fitted: PooledFit) -> str:
-    """A sentence on the run whose error is far larger than the others', or nothing."""
+    """A sentence on the run whose error is far larger than the others'; empty if there is none."""
     worst, left = _worst(problem, fitted)
     if worst is None:
         return ""
@@ -145,7 +148,8 @@ def outlying_run(problem: FitProblem, fitted: PooledFit) -> str:
 
 
 def outlier_evidence(problem: FitProblem, fitted: PooledFit) -> float:
-    """The formula above, of the run whose error is far larger than the others'; -inf where there is none."""
+    """Log evidence [nats] that the run of far larger error has a curve of its own (the formula above); -inf where there
+    is no such run."""
     worst, left = _worst(problem, fitted)
     if worst is None:
         return -np.inf
@@ -166,7 +170,8 @@ def outlier_evidence(problem: FitProblem, fitted: PooledFit) -> float:
 
 
 def _own_curve(design: Design, here: NDArray[np.bool_]) -> FloatArray:
-    """[N, m] Nm per unit: smooth in speed and pressure, in one run alone."""
+    """Basis [N, m] Nm per unit of one run's own curve: products of cosines over speed and pressure, 0 at the rows of
+    other runs."""
     waves = [np.ones((here.size, 1))]
     for values, orders in ((design.rows.velocity, 4), (design.rows.pressure, 2)):
         unit = (values - values.min()) / max(float(np.ptp(values)), 1e-300)
@@ -176,9 +181,9 @@ def _own_curve(design: Design, here: NDArray[np.bool_]) -> FloatArray:
 
 
 def _worst(problem: FitProblem, fitted: PooledFit) -> tuple[int | None, FloatArray]:
-    """The run whose error is far larger than the others', if one is, and the error [N] Nm without what gains and the law
-    make of it. Where a run is so far off that the fit is bent between all of them, it is the one without which the others
-    fit."""
+    """The index of the run whose error is far larger than the others', or None, and the residual [N] Nm minus gains and
+    the law's discrepancy. If a run is so far off that the fit lies between it and the others, it is found as the run
+    without which the others fit."""
     left = left_over(problem, fitted)
     if len(problem.design.runs) < 4:
         return None, left
@@ -199,7 +204,8 @@ def _worst(problem: FitProblem, fitted: PooledFit) -> tuple[int | None, FloatArr
 
 
 def _beyond(problem: FitProblem, left: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """By run, the squares of an error [N] Nm in deviations beyond what noise brings, and the number of rows."""
+    """Excess sum of squares of each run [R], Σ (error/deviation)² minus its number of rows and at least 0, and that
+    number [R]; `left` is the error [N] Nm."""
     of, runs = problem.design.rows.run, len(problem.design.runs)
     count = np.bincount(of, minlength=runs).astype(np.float64)
     squares = np.bincount(of, weights=(left / problem.noise.deviation) ** 2, minlength=runs)
@@ -207,13 +213,13 @@ def _beyond(problem: FitProblem, left: FloatArray) -> tuple[FloatArray, FloatArr
 
 
 def _left_out(problem: FitProblem, run: int) -> FitProblem:
-    """The problem in which a run weighs nothing."""
+    """The problem with one run's deviations so large that its rows have no weight."""
     deviation = np.where(problem.design.rows.run == run, 1e6, 1.0) * problem.noise.deviation
     return problem.with_noise(replace(problem.noise, deviation=deviation))
 
 
 def temperature_evidence(problem: FitProblem, fitted: PooledFit) -> float:
-    """Evidence [nats] of unmeasured courses of oil temperature over none."""
+    """Log Bayes factor [nats] of an unmeasured, varying oil temperature over none."""
     columns, between, within = _courses(problem.design, fitted)
     gram = gram_of(problem, fitted, columns)
     projections = projections_of(gram, problem.noise)
@@ -225,7 +231,8 @@ def temperature_evidence(problem: FitProblem, fitted: PooledFit) -> float:
 
 
 def _courses(design: Design, fitted: PooledFit) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Columns [N, m] of torque and their relative deviations [m] from test to test and within a test."""
+    """Changes of torque [N, m] Nm per unit of ln viscosity, constant in each test or cosines and sines of its clock,
+    and their relative prior deviations [m] from test to test and [m] within a test."""
     viscous = fitted.prediction.change_at_rows(design, fitted.prediction.scene.viscous, before_lag=True)
     columns, relative = [], []
     for run in np.unique(design.rows.run):

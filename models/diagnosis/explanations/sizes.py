@@ -34,7 +34,7 @@ _AMPLITUDES = 200
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Size:
-    """The size of an effect after the last state, given that it is at work."""
+    """The posterior of an effect's size after the last state, given that it is at work."""
 
     value: float
     sd: float
@@ -46,7 +46,7 @@ class Size:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sizes:
-    """The draws that stand for a judgement, and the size of each cause by slug."""
+    """Posterior draws of a judgement's causes, and the size of each cause by slug."""
 
     draws: tuple[Draw, ...] = ()
     by_slug: Mapping[str, Size]
@@ -54,7 +54,7 @@ class Sizes:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Component:
-    """A refit with its weight."""
+    """A component of the posterior mixture: a refit with its weight and a normal about it."""
 
     weight: float
     fit: PooledFit
@@ -64,7 +64,7 @@ class _Component:
     last: tuple[FloatArray, ...]  # φ after the last state by effect
 
     def effects(self, off: FloatArray) -> tuple[FittedEffect, ...]:
-        """The effects at one sample [m]."""
+        """The fitted effects at one sample [m] of the component."""
         drawn, at, after = [], 0, sum(1 + len(fitted.smooth_places) for fitted in self.fit.effects)
         for fitted, last in zip(self.fit.effects, self.last, strict=True):
             shape = list(fitted.shape)
@@ -84,7 +84,7 @@ class _Component:
         return tuple(drawn)
 
     def sizes(self, drawn: Sequence[FittedEffect]) -> list[float]:
-        """The size of each effect after the last state."""
+        """Sizes of the effects after the last state, template errors included."""
         return [
             effect.amplitude * max(1.0 + float(last @ np.array(effect.factors)), 0.0)
             for effect, last in zip(drawn, self.last, strict=True)
@@ -92,7 +92,8 @@ class _Component:
 
 
 def sizes_of(problem: FitProblem, judgement: Judgement, rng: np.random.Generator) -> Sizes:
-    """The sizes of a judgement's causes, and DRAWS draws or fewer of equal weight; none where nothing was fitted."""
+    """Posterior sizes of a judgement's causes, and DRAWS draws or fewer of equal weight; none where nothing was
+    fitted."""
     components = [
         component for fitted, share in _shares(judgement) for component in _components(problem, fitted, share, rng)
     ]
@@ -128,8 +129,8 @@ def sizes_of(problem: FitProblem, judgement: Judgement, rng: np.random.Generator
 
 
 def _shares(judgement: Judgement) -> list[tuple[PooledFit, float]]:
-    """The fitted explanations that stand with their probabilities, which sum to one at most. What holds one of them and
-    something beside it that does not stand counts as the largest that it holds."""
+    """The fits of the explanations that stand, with their probabilities, whose sum is at most one. An explanation with
+    further causes beside one that stands counts for the largest one it contains."""
     shares = [0.0] * len(judgement.stand)
     for each in judgement.explanations:
         places = [k for k, cause in enumerate(judgement.stand) if set(cause.slugs) <= {*each.effects}]
@@ -139,7 +140,7 @@ def _shares(judgement: Judgement) -> list[tuple[PooledFit, float]]:
 
 
 def _size(sizes: FloatArray) -> Size:
-    """A size from samples."""
+    """Mean, standard deviation, 90 % interval and sign uncertainty of a size from samples [n]."""
     likelier = max(float((sizes > 0).mean()), float((sizes < 0).mean()))
     low, high = np.quantile(sizes, (0.05, 0.95)).tolist()
     return Size(
@@ -153,7 +154,8 @@ def _size(sizes: FloatArray) -> Size:
 def _components(
     problem: FitProblem, original: PooledFit, share: float, rng: np.random.Generator
 ) -> Iterator[_Component]:
-    """A fit's effects refitted under each of their courses, weighed by evidence; as they were found where they have none."""
+    """Components of the posterior of a fit's effects, refitted under each of their courses and weighted by evidence;
+    under the fitted shapes if they have no courses."""
     # a prior that is nearly flat in a size's logarithm: that the effect is at work is decided already
     flat = [replace(e.effect, tails=min(e.effect.tails, criteria.SIZE_TAILS)) for e in original.effects]
     effects = [replace(e, effect=effect) for e, effect in zip(original.effects, flat, strict=True)]
@@ -169,8 +171,8 @@ def _components(
 
 
 def _courses(problem: FitProblem, fitted: PooledFit) -> Iterator[tuple[float, PooledFit]]:
-    """Log weight [nats] and refit of every course that counts. Of each kind the course most like the fitted one is refitted
-    first, and then its neighbours as long as they count."""
+    """Log weight [nats] and refit of every course of non-negligible weight. Of each kind the course most like the
+    fitted one is refitted first, and then its neighbours as long as their weights count."""
     best = -np.inf
     for place, effect in enumerate(fitted.effects):
         if effect.effect.courses is None:
@@ -201,7 +203,8 @@ def _courses(problem: FitProblem, fitted: PooledFit) -> Iterator[tuple[float, Po
 
 
 def _with_free(shape: tuple[float, ...], fitted: FittedEffect) -> tuple[float, ...]:
-    """A course's shape, smooth shapes that are not held as they were fitted where it is of the same kind."""
+    """The shape of a course; if it is of the fitted kind, with the fitted values of the smooth shapes that are not
+    held."""
     if shape[0] != fitted.shape[0]:
         return shape
     own = zip(shape, fitted.shape, fitted.effect.shapes, strict=True)
@@ -209,7 +212,7 @@ def _with_free(shape: tuple[float, ...], fitted: FittedEffect) -> tuple[float, .
 
 
 def _most_alike(fitted: PooledFit, effect: FittedEffect, kind: Sequence[Tried]) -> int:
-    """Which of the courses changes torque most like an effect as it is fitted."""
+    """Index of the course whose change of torque is most nearly parallel to that of the fitted effect."""
     scene = fitted.prediction.scene
     change = effect.effect.change(scene, effect.amplitude, effect.shape)
     other_changes = effect.effect.changes(scene, [(effect.amplitude, tried.shape) for tried in kind])
@@ -218,8 +221,8 @@ def _most_alike(fitted: PooledFit, effect: FittedEffect, kind: Sequence[Tried]) 
 
 
 def _that_count(whole: Gram, gram: Gram, problem: FitProblem) -> Iterator[Projected]:
-    """The projections of a fit's effects at each scatter of the gains and size of the law that holds NEGLIGIBLE or more of
-    the posterior about the fit."""
+    """Projections of a fit's effects at each scatter of the gains and size of the law with at least NEGLIGIBLE of the
+    posterior about the fit."""
     about = projections_beside(whole, problem.noise)
     total = log_sum([projected.evidence for projected in about])
     reduced: dict[tuple[float, float], Reduced] = {}
@@ -234,8 +237,8 @@ def _that_count(whole: Gram, gram: Gram, problem: FitProblem) -> Iterator[Projec
 def _components_of(
     problem: FitProblem, fitted: PooledFit, weight: float, rng: np.random.Generator
 ) -> Iterator[_Component]:
-    """A refit's components: one for each scatter of the gains, size of the law and size of the templates' errors that
-    counts."""
+    """Mixture components of a refit, one for each non-negligible combination of scatter of the gains, size of the law
+    and size of the templates' errors."""
     design, free = problem.design, int(problem.priors.free.sum())
     factors, uncertain = template_errors(design, fitted)
     errors = off_by(design, fitted, factors)

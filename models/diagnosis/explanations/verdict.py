@@ -24,19 +24,20 @@ _AXES = {**LINES, OUTLIER: CYCLES}
 
 
 class Alternative(NamedTuple):
-    """The causes, by slug in order, and what is unknown beside them: an axis of structure (`design.design`), the slug of an
-    uncatalogued fault, a line, an outlying run, or nothing (empty)."""
+    """A set of causes, slugs in alphabetical order, and at most one unknown beside them: an axis of structure
+    (`design.design`), the slug of an uncatalogued fault, a line, an outlying run, or nothing (empty)."""
 
     causes: tuple[str, ...] = ()
     unknown: str = ""
 
     @property
     def named(self) -> tuple[str, ...]:
-        """All that has a name, an uncatalogued fault too."""
+        """Slugs of the causes, and of the uncatalogued fault if there is one."""
         return (*self.causes, *((self.unknown,) if self.unknown in FAULT_BY_SLUG else ()))
 
     def and_effect(self, slug: str) -> "Alternative | None":
-        """With one thing more, a cause or an uncatalogued fault; None where that is not on the list."""
+        """The alternative with one effect more, a cause or an uncatalogued fault; None where the list has no such
+        alternative."""
         if len(self.causes) > 1 or self.unknown or slug in self.causes:
             return None
         if slug in FAULT_BY_SLUG:
@@ -44,7 +45,7 @@ class Alternative(NamedTuple):
         return Alternative(tuple(sorted((*self.causes, slug))))
 
     def without(self, slug: str) -> "Alternative":
-        """With one thing less."""
+        """The alternative without one effect."""
         return Alternative(tuple(c for c in self.causes if c != slug), "" if self.unknown == slug else self.unknown)
 
 
@@ -52,19 +53,20 @@ NOTHING = Alternative()
 
 
 def is_axis(unknown: str) -> bool:
-    """Whether what is unknown is smooth structure on an axis."""
+    """Whether an alternative's unknown part is smooth structure on an axis."""
     return bool(axis_of(unknown)) and axis_of(unknown) == unknown
 
 
 def axis_of(unknown: str) -> str:
-    """The axis on which something unknown lies; of nothing unknown none (empty)."""
+    """The axis on which an alternative's unknown part lies; empty where there is none."""
     if unknown in FAULT_BY_SLUG:
         return FAULT_BY_SLUG[unknown].axis
     return _AXES.get(unknown, unknown)
 
 
 class Verdict(StrEnum):
-    """The honest answers: nothing beyond noise, these causes, one of these, something else, too little data."""
+    """The possible answers of a diagnosis: nothing beyond noise, these causes, one of several causes, structure without
+    a name, too little data."""
 
     MODEL_ADEQUATE = "model_adequate"
     CAUSE_NAMED = "cause_named"
@@ -79,7 +81,7 @@ UNCATALOGUED = "uncatalogued"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Explanation:
-    """One of the explanations, which exclude each other."""
+    """One of the mutually exclusive explanations, with its probability."""
 
     effects: tuple[str, ...]  # slugs of those at work (UNCATALOGUED among them), or none
     probability: float  # that these and no others are
@@ -98,14 +100,15 @@ def probabilities_by_slug(explanations: Iterable[Explanation]) -> dict[str, floa
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Where:
-    """An axis on which structure lies (`design.design`), the evidence of it [nats], and the p-value that bounds."""
+    """An axis on which structure lies (`design.design`), and the evidence of it [nats]."""
 
     axis: str
     strength: float
 
     @property
     def p_value(self) -> float:
-        """A likelihood ratio of so many nats is as rare as e^-strength."""
+        """Upper bound e^-strength of the p-value: a likelihood ratio of `strength` nats is at most as probable by
+        chance."""
         return float(np.exp(-np.clip(self.strength, 0.0, 700.0)))
 
 
@@ -120,7 +123,7 @@ class Fitted:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Judgement:
-    """The verdict, and what was fitted behind it."""
+    """The verdict, the explanations it is read off, and the fits behind them."""
 
     verdict: Verdict
     causes: tuple[str, ...] = ()

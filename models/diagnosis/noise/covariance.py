@@ -23,7 +23,8 @@ from models.diagnosis.design.design import Design, IntArray
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Noise:
-    """The covariance of the rows, as its parts."""
+    """The covariance of the rows, as its parts: deviations, correlations, scatter of gains and sizes of the law's
+    discrepancy."""
 
     deviation: FloatArray  # of each row [N] Nm
     plateaus: Correlation  # along plateaus
@@ -34,7 +35,7 @@ class Noise:
 
 
 def whitened(columns: FloatArray, design: Design, noise: Noise) -> FloatArray:
-    """R^{-1/2} D^{-1} of columns [N, m]: everything but the gains."""
+    """Columns [N, m] whitened by R^{-1/2} D^{-1}: deviations and correlation along a run, without the gains."""
     out = columns / noise.deviation[:, None]
     for rows in design.chains:
         first, last = int(rows[0, 0]), int(rows[-1, -1])
@@ -81,7 +82,7 @@ class Gains:
 
 
 def gains_of(design: Design, torque: FloatArray, noise: Noise) -> Gains:
-    """The gains' directions for the predicted torque [N] Nm."""
+    """The whitened gain directions of runs and curves for the predicted torque [N] Nm."""
     run, runs = design.rows.run, int(design.rows.run.max()) + 1
     pairs = np.unique(np.stack([run, design.curve]), axis=1)[0]  # curves are numbered run by run, by pressure
     own = np.bincount(pairs, minlength=runs)
@@ -96,7 +97,8 @@ def gains_of(design: Design, torque: FloatArray, noise: Noise) -> Gains:
 
 
 def scatter_root(curves: int, run_gain: float, curve_gain: float) -> FloatArray:
-    """Root [k, j] of the covariance K = σ_c² + σ_g² 11ᵀ of the gains of a run's curves; one column without σ_c."""
+    """Root [k, j] of the covariance K = σ_c² + σ_g² 11ᵀ of the gains of a run's k curves, with one column if there is
+    no σ_c."""
     if curve_gain == 0.0:
         return np.full((curves, 1), run_gain)
     alike = (np.hypot(curve_gain, np.sqrt(curves) * run_gain) - curve_gain) / curves
@@ -104,15 +106,15 @@ def scatter_root(curves: int, run_gain: float, curve_gain: float) -> FloatArray:
 
 
 def metric(design: Design, torque: FloatArray, noise: Noise, law: FloatArray | None = None) -> Products:
-    """The inner products Xᵀ V⁻¹ X [m, m] of columns X [N, m] Nm, gains taken along a torque [N] Nm, with the columns C T
-    [N, k] Nm of the law's discrepancy. By Woodbury's formula the gains' whitened directions are taken off, then what is left
-    of the law's columns: no product with [N, m] is taken twice."""
+    """A function from columns X [N, m] Nm to their inner products Xᵀ V⁻¹ X [m, m], gains taken along a torque [N] Nm,
+    with the columns C T [N, k] Nm of the law's discrepancy. By Woodbury's formula the gains' whitened directions are
+    projected off, then the rest of the law's columns: no product with [N, m] is taken twice."""
     gains = gains_of(design, torque, noise)
     root = scatter_root(gains.overlaps.shape[-1], noise.run_gain, noise.curve_gain)
     by_gain = np.linalg.solve(np.linalg.cholesky(np.eye(root.shape[1]) + root.T @ gains.overlaps @ root), root.T)
 
     def parts(columns: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Columns whitened, and what gains explain of them."""
+        """Whitened columns [N, m], and their projections [R j, m] on the gains' directions."""
         white = whitened(columns, design, noise)
         return white, np.concatenate(by_gain @ gains.along(white))
 

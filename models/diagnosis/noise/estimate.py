@@ -45,23 +45,24 @@ class ResidualPiece:
     contrasts: FloatArray
 
     def remainder(self, residual: FloatArray) -> FloatArray:
-        """What is left [n] Nm of residual [N] Nm on the piece's rows without its smooth part."""
+        """Residual [n] Nm on the piece's rows minus its smooth part, from the residual [N] Nm of all rows."""
         return np.asarray(self.contrasts @ (self.contrasts.T @ residual[self.rows]), dtype=np.float64)
 
     def mean_square(self, residual: FloatArray) -> float:
-        """The remainder's variance [Nm²]."""
+        """Mean square of the contrasts [Nm²], an estimate of the noise variance."""
         return float(np.mean((self.contrasts.T @ residual[self.rows]) ** 2))
 
 
 def owners(design: Design) -> IntArray:
-    """The number [N] of each row's curve or loop."""
+    """The index [N] of each row's curve or loop."""
     loops = design.curve.max(initial=0) + 1 + design.rows.loop
     return np.asarray(np.where(design.rows.steady, design.curve, loops), dtype=np.intp)
 
 
 def pieces_across_curves(design: Design, part: NDArray[np.bool_]) -> list[ResidualPiece]:
-    """Where curves have too few speeds, the same speed over the pressures of a run, among the rows of `part` [N]; with too
-    few pressures as well the same point from state to state, where what scatters from run to run counts for noise."""
+    """Residual pieces for curves of too few speeds, among the rows of `part` [N]: rows of one speed over the pressures
+    of a run. If there are too few pressures as well, rows of one speed and pressure over the states; there the scatter
+    from run to run counts as noise."""
     indices, rows = np.flatnonzero(part), design.rows
     speed = np.round(rows.velocity / max(float(rows.velocity.max()), 1e-300), 2)
     pieces = list[ResidualPiece]()
@@ -101,8 +102,8 @@ def _pieces(
 
 
 def calm_pieces(design: Design, part: NDArray[np.bool_], residual: FloatArray) -> list[ResidualPiece]:
-    """The pieces of `part` [N] whose remainder of residual [N] Nm is noise: whole curves, unless short pieces typically show
-    less than a SHARP-th of their mean square; then those short ones that show less than SHARP times what is typical."""
+    """The pieces of `part` [N] whose remainder of residual [N] Nm is noise: whole curves, unless the median mean square
+    of short pieces is less than a SHARP-th of theirs; then the short pieces below SHARP times their median."""
     rows, owner = np.flatnonzero(part), owners(design)
     whole_curves, short = (_pieces(design, rows, owner, longest) for longest in (_LONGEST, _SHORT))
     if not part[0] or not short:  # a loop's harmonics do not become fewer in a part of it
@@ -128,7 +129,8 @@ def estimate_correlation(
     from_samples: tuple[float, float] | None,
     period_differences: Sequence[FloatArray],
 ) -> tuple[Correlation, float]:
-    """(w, ρ) of residual [N] Nm with deviation [N] Nm, and the factor by which the deviations are off.
+    """Correlation (w, ρ) of neighbouring rows in a residual [N] Nm with deviation [N] Nm, and the factor by which the
+    deviations are to be scaled.
 
     w ρ and w ρ², the correlations of the first and second neighbour, are averaged over the grid: a likelihood that is flat
     along a ridge must not choose its end. Where samples show both (`from_samples`), these are used unless bins contradict.
@@ -171,7 +173,8 @@ def estimate_correlation(
 def _restricted_likelihood(
     correlation: Correlation, groups: dict[int, tuple[FloatArray, list[FloatArray]]]
 ) -> tuple[float, float]:
-    """log L [nats] of a correlation at the variance s² that suits it best, and that variance."""
+    """Restricted log likelihood log L [nats] of a correlation, at its maximum over the variance s², and that
+    variance."""
     squares, logdet, free = 0.0, 0.0, 0
     for contrasts, series in groups.values():
         distance = np.abs(np.subtract.outer(np.arange(contrasts.shape[0]), np.arange(contrasts.shape[0])))
@@ -187,7 +190,7 @@ def _restricted_likelihood(
 
 
 def first_noise(design: Design) -> Noise:
-    """Before anything is fitted: the assumed share of the torque."""
+    """The noise assumed before anything is fitted: a fixed share of the torque, white."""
     of_sample = criteria.ASSUMED * np.abs(design.torque) + 0.2 * criteria.ASSUMED * design.usual_torque + 1e-12
     deviation, white = of_sample / np.sqrt(np.minimum(design.samples, 30)), Correlation()
     # some tenths of a percent are usual
@@ -195,7 +198,8 @@ def first_noise(design: Design) -> Noise:
 
 
 def estimate_noise(design: Design, residual: FloatArray, torque: FloatArray, before: Noise) -> tuple[Noise, bool]:
-    """The noise in residual [N] Nm about torque [N] Nm, and whether it had to be assumed for plateaus or for loops."""
+    """The noise in residual [N] Nm about torque [N] Nm, and whether it was assumed, for plateaus or for loops, because
+    there are too few rows to estimate it."""
     deviation, residual = before.deviation.copy(), unlike(design, residual, torque)
     correlations, assumed = [], False
     steady = np.arange(residual.size) < design.plateaus
@@ -230,8 +234,8 @@ def estimate_noise(design: Design, residual: FloatArray, torque: FloatArray, bef
 
 
 def unlike(design: Design, residual: FloatArray, torque: FloatArray) -> FloatArray:
-    """The residual [N] Nm without what tests at one pressure and speed have in common, of which there are LEAST_REPEATS or
-    more, as large as before it was taken off where there is noise alone."""
+    """Residual [N] Nm minus the median relative error of the tests at each pressure and speed, where there are
+    LEAST_REPEATS or more; scaled so that pure noise keeps its variance."""
     rows = np.flatnonzero(design.closed & design.rows.steady & (np.abs(torque) > 0.0))
     if not rows.size:
         return residual
@@ -257,7 +261,8 @@ def _free(pieces: Sequence[ResidualPiece]) -> int:
 def _variance(
     pieces: Sequence[ResidualPiece], residual: FloatArray, torque: FloatArray, samples: FloatArray
 ) -> FloatArray:
-    """(a² + b² M²)/n [N] by iterated non-negative least squares on squared remainders, spikes cut."""
+    """Variance (a² + b² M²)/n [N] Nm² of each row, by iterated non-negative least squares on squared remainders, spikes
+    cut."""
     rows = np.concatenate([piece.rows for piece in pieces])
     remainder = np.concatenate([piece.remainder(residual) for piece in pieces])
     leverage = np.concatenate([(piece.contrasts**2).sum(axis=1) for piece in pieces])

@@ -57,7 +57,8 @@ _MOST_SHARE = 0.6
 
 
 def starting_laws(design: Design, frame: Frame) -> Laws:
-    """Laws through the curves' own fits."""
+    """Starting laws for the pooled fit, by robust regression over pressure and life through the parameters of
+    single-curve fits."""
     pressure, cycles, values, deviations = _curve_values(design)
     theta = np.zeros(ATTRACTOR + frame.loop_pressures.size + POWERS)
     theta[KAPPA] = np.log(12 * design.usual_torque)
@@ -102,8 +103,9 @@ def _speeds(design: Design) -> FloatArray:
 
 
 def cautious_laws(design: Design, start: Laws) -> Laws:
-    """A second start for the fit, for curves that hardly determine a parameter: fresh values at least a quarter of their
-    median, changes over life of at most 0.6, and half of each change at half the life. It may lead to another minimum."""
+    """A second start for the fit, where single curves hardly determine a parameter: fresh values at least a quarter of
+    their median, changes over life of at most 0.6, and half of each change at half the life. It may lead to another
+    minimum."""
     theta = start.theta.copy()
     for block in theta[: 4 * BLOCK].reshape(4, BLOCK):
         usual = max(float(np.median(np.abs(block[ENDS]))), 1e-12)
@@ -116,8 +118,8 @@ def cautious_laws(design: Design, start: Laws) -> Laws:
 def _along(
     first: FloatArray, second: FloatArray, done: FloatArray, value: FloatArray, deviation: FloatArray
 ) -> tuple[list[float], float]:
-    """Two fresh values and their shares, by robust ridge regression, and its cost: a curve's own fit may
-    be far off where it hardly determines a parameter."""
+    """Two fresh values and their shares of change over life by robust ridge regression, and its cost; robust, because a
+    curve's own fit may be far off where it hardly determines a parameter."""
     columns = np.stack([first, second, first * done, second * done], axis=1)
     scale = max(float(np.median(np.abs(value))), 1e-12)
     ridge = np.diag([1e-3, 1e-3, 0.1, 0.1]) / scale
@@ -137,7 +139,8 @@ def _along(
 
 
 def _curve_values(design: Design) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Pressure [c], cycles [c], the four parameters [c, 4] and their deviations [c, 4] of the curves of a few runs."""
+    """Pressure [c] Pa, cycles [c], the four Stribeck parameters [c, 4] and their standard deviations [c, 4] of the
+    curves of a few runs."""
     plateaus = np.flatnonzero(design.closed[: design.plateaus])
     runs = np.unique(design.rows.run[plateaus])
     chosen = runs[np.unique(np.linspace(0, runs.size - 1, min(6, runs.size)).round().astype(int))]
@@ -163,7 +166,8 @@ def _curve_values(design: Design) -> tuple[FloatArray, FloatArray, FloatArray, F
 
 
 class IndeterminateError(Exception):
-    """The data determine no baseline, and the message says what they lack: the one expected end without a report."""
+    """Raised where the data determine no baseline; the message names the missing data. It is the one expected end
+    without a report."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -178,7 +182,8 @@ class Baseline:
 
 
 def missing_for_baseline(design: Design) -> str:
-    """What is missing for a pooled baseline, or nothing."""
+    """The reason why a campaign cannot have a pooled baseline (too few plateaus, impossible torques), as a sentence;
+    empty where it can."""
     steady = design.rows.velocity[design.closed & design.rows.steady]
     if steady.size < criteria.FEWEST_ROWS:
         plateaus_found = f"there are {steady.size} plateaus of stationary tests under pressure"
@@ -190,7 +195,8 @@ def missing_for_baseline(design: Design) -> str:
 
 
 def fit_baseline(design: Design) -> Baseline:
-    """The pooled fit from several starts, and the noise that its residuals show, in turns. Raises IndeterminateError."""
+    """The pooled fit without effects, from several starts, and the noise estimated from its residuals, in alternation.
+    Raises IndeterminateError."""
     frame = frame_of(design)
     start = starting_laws(design, frame)
     problem = FitProblem(design=design, noise=first_noise(design), priors=priors_of(design, start.theta, frame))
@@ -204,7 +210,7 @@ def fit_baseline(design: Design) -> Baseline:
 
 
 def _with_its_noise(problem: FitProblem, fitted: PooledFit) -> Baseline:
-    """A fit followed to its end under the noise that its residuals show."""
+    """The fit continued to convergence under the noise that its residuals show."""
     noise, assumed = estimate_noise(problem.design, fitted.residual, fitted.torque, problem.noise)
     problem = replace(problem, noise=noise, fitted=fitted.torque)
     exact = fitted = fit(problem, fitted.laws)
@@ -234,7 +240,8 @@ def _with_its_noise(problem: FitProblem, fitted: PooledFit) -> Baseline:
 
 
 def _with_law(problem: FitProblem, fitted: PooledFit, laws: Laws) -> FitProblem:
-    """The problem with the discrepancy of laws, whose form moves with V_S or does not: the likelier one."""
+    """The problem with the law's discrepancy linearised about `laws`; of its two forms, moving along speed with V_S or
+    fixed, the one of higher evidence."""
     either = [law_discrepancy(problem.design, laws, moving=moving) for moving in (False, True)]
     laws_tried = {one.form: one for one in either}.values()  # one where V_S is anything
     problems = [replace(problem, law=LawTerms(one, one.columns(problem.design))) for one in laws_tried]
@@ -242,19 +249,21 @@ def _with_law(problem: FitProblem, fitted: PooledFit, laws: Laws) -> FitProblem:
 
 
 def _likeliest(gram: Gram, problem: FitProblem) -> Projected:
-    """Of every second scatter of the gains and all sizes of the law."""
+    """The projection of highest evidence over every second scatter of the runs' gains and all sizes of the law's
+    discrepancy."""
     return max(projections_of(gram, problem.noise, GAINS[::2]), key=lambda one: one.evidence)
 
 
 def _lagging_as(laws: Laws, other: Laws) -> Laws:
-    """Laws with the C of other laws."""
+    """The laws with the attractor law C (lag of friction in loops) of `other`."""
     theta = laws.theta.copy()
     theta[KAPPA], theta[DRIFT:ATTRACTOR] = other.theta[KAPPA], other.theta[DRIFT:ATTRACTOR]
     return replace(laws, theta=theta)
 
 
 def _require_weights(problem: FitProblem, fitted: PooledFit) -> None:
-    """Raise IndeterminateError where there is nothing that models could be weighed by."""
+    """Raises IndeterminateError where the evidence of models could not be compared: the fit is not finite, or the
+    readings have no noise."""
     design, deviation = problem.design, problem.noise.deviation
     finite = fitted.status is not FitStatus.NOT_FINITE
     if finite:  # else the rounding of a parameter changes torque by more than its usual size

@@ -29,8 +29,8 @@ _LARGEST_STEP = 1.5
 
 
 class FitStatus(StrEnum):
-    """How a fit ended: the cost stopped falling; no step lowered it at all; it used all of its steps; its cost or its
-    derivatives were not finite."""
+    """The way a fit ended: the cost stopped falling; no step lowered it at all; it used all of its steps; its cost or
+    its derivatives were not finite."""
 
     CONVERGED = "converged"
     STALLED = "stalled"
@@ -40,7 +40,7 @@ class FitStatus(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PooledFit:
-    """A fitted model."""
+    """A fit of all rows of a campaign: parameters, predicted torque, residual, effects, cost and how the fit ended."""
 
     laws: Laws
     prediction: Prediction  # of the baseline part
@@ -52,7 +52,7 @@ class PooledFit:
 
     @property
     def wrong_sign(self) -> bool:
-        """Whether a one-sided effect came out negative."""
+        """Whether the fitted amplitude of a one-sided effect is negative."""
         return any(effect.wrong_sign for effect in self.effects)
 
 
@@ -64,8 +64,8 @@ def fit(
     steps: int = STEPS,
     reach: float = math.inf,
 ) -> PooledFit:
-    """Minimise the cost from a start, effects included; `steps` at most, and no further where at the pace of its last two
-    steps the fit would not come down to a cost of `reach`.
+    """The least-cost fit found from a start, effects included, in at most `steps` damped Gauss-Newton steps. It stops
+    early where, at the pace of its last two steps, the cost would not come down to `reach`.
 
     Gains are taken along one torque (`FitProblem.gained`), which keeps the metric fixed while a fit moves.
     """
@@ -108,7 +108,8 @@ def fit(
 
 
 def _inside(state: PooledFit, priors: Priors, matrix: FloatArray, gradient: FloatArray) -> FloatArray:
-    """The step [m] that matrix · step = gradient asks for; what is at a bound beyond which it would lead is held there."""
+    """Solution [m] of matrix · step = gradient; parameters at a bound that the step would cross are held and the others
+    solved again."""
     step = np.asarray(np.linalg.solve(matrix, gradient), dtype=np.float64)
     at, at_bound = int(priors.free.sum()), np.zeros(step.size, dtype=np.bool_)
     for fitted in state.effects:
@@ -157,7 +158,7 @@ def sensitivities(problem: FitProblem, fitted: PooledFit) -> FloatArray:
 
 
 def prior_gram(priors: Priors, fitted: PooledFit) -> FloatArray:
-    """What priors add [m + 1, m + 1] to the Gram matrix of (sensitivities, residual)."""
+    """The priors' contribution [m + 1, m + 1] to the Gram matrix of (sensitivities, residual)."""
     rows, off = priors.rows[:, priors.free], priors.means - priors.rows @ fitted.laws.theta
     free, own = rows.shape[1], [effect.precisions for effect in fitted.effects]
     gram = np.diag(np.concatenate([np.zeros(free), *own, [0.0]]))
@@ -174,7 +175,7 @@ def prior_gram(priors: Priors, fitted: PooledFit) -> FloatArray:
 
 
 def _normal(problem: FitProblem, metric: Products, state: PooledFit) -> tuple[FloatArray, FloatArray]:
-    """Gram matrix and gradient over the free θ and the effects' parameters."""
+    """Gram matrix [m, m] and gradient [m] of the cost over the free θ and the effects' parameters."""
     whole = metric(np.column_stack([sensitivities(problem, state), state.residual])) + prior_gram(problem.priors, state)
     gram, gradient = whole[:-1, :-1], whole[:-1, -1]
     diagonal = np.diag(gram)
@@ -183,7 +184,8 @@ def _normal(problem: FitProblem, metric: Products, state: PooledFit) -> tuple[Fl
 
 
 def _moved(state: PooledFit, priors: Priors, step: FloatArray) -> tuple[Laws, tuple[FittedEffect, ...]] | None:
-    """The state after a step, shapes kept inside their bounds; logarithms move by a limited amount."""
+    """The laws and effects after a step, shapes kept inside their bounds and logarithms moved by at most 1.5; None if
+    the step is not finite."""
     if not np.isfinite(step).all():
         return None
     count = int(priors.free.sum())
@@ -233,8 +235,9 @@ def refit(
 def _starts(
     design: Design, laws: Laws, effects: tuple[FittedEffect, ...]
 ) -> Iterator[tuple[Laws, tuple[FittedEffect, ...]]]:
-    """Where a refit begins: as given; and where a fresh value is below 0, with all of them above it as well, the last effect
-    then large and with each smooth shape of its grid, for what was screened about bent curves says little of its size."""
+    """Starting points of a refit: the laws as given; and where a fresh value is below 0, also with all fresh values
+    made positive, the last effect then large and with each smooth shape of its grid, because a screen about curves with
+    a wrong sign says little about its size."""
     yield laws, effects
     if np.all(_ends(laws) >= 0.0):  # one that is not free is 0
         return
@@ -266,7 +269,7 @@ def _upright(laws: Laws) -> Laws:
 
 
 def refit_beside(problem: FitProblem, start: PooledFit, pattern: FloatArray) -> PooledFit | None:
-    """The fit where a pattern [N] Nm of the rows is taken off what was measured, as a fit to what was measured: the baseline
+    """The fit to the measured torque minus a pattern [N] Nm, with the pattern added back to its residual: the baseline
     moves to where it leaves that pattern."""
     design = problem.design
     without = replace(problem, design=replace(design, torque=design.torque - pattern))

@@ -21,7 +21,7 @@ from models.diagnosis.noise.covariance import Noise, Products, metric
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Priors:
-    """Rows of prior on θ: (combination θ - mean)/sd."""
+    """Normal priors on linear combinations of θ, as rows (combination θ - mean)/sd of the least-squares problem."""
 
     rows: FloatArray  # [q, θ.size], divided by sd
     means: FloatArray  # [q] likewise
@@ -29,7 +29,8 @@ class Priors:
 
 
 def priors_of(design: Design, start: FloatArray, frame: Frame) -> Priors:
-    """Weak priors around scales of the data; what the campaign cannot determine at all is held fixed."""
+    """Weak normal priors on θ, scaled by the campaign's torque, speeds and life; parameters that the campaign cannot
+    determine at all are held fixed."""
     size = start.size
     level = design.usual_torque
     fastest = 2.0 * frame.reference_velocity
@@ -86,7 +87,7 @@ class LawTerms:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FitProblem:
-    """A least-squares problem."""
+    """The least-squares problem of a campaign: rows, noise, priors and the law's discrepancy."""
 
     design: Design  # rows and measured torque
     noise: Noise  # their covariance
@@ -113,6 +114,6 @@ class FitProblem:
         return replace(self, law=None, noise=replace(self.noise, law=EXACT))
 
     def metric(self, noise: Noise | None = None) -> Products:
-        """V⁻¹ of the problem's noise, or of another one."""
+        """The inner product under V⁻¹, of the problem's noise or of another one."""
         noise = noise or self.noise
         return metric(self.design, self.gained, noise, None if self.law is None else self.law.scaled(noise.law))

@@ -43,7 +43,8 @@ from models.gaussian_evidence import independent, log_sum
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Crossed:
-    """Columns [s] that are only screened, one by one: their inner products with the others and with themselves."""
+    """Inner products of columns [s] that are only screened, one by one: with the other columns, with themselves and
+    along the gains."""
 
     cross: FloatArray  # [m, s]
     squares: FloatArray  # [s]
@@ -52,8 +53,8 @@ class Crossed:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Gram:
-    """Inner products of whitened columns [m]: first the `laws` columns of the law's discrepancy, then what else the baseline
-    has free, `base` of both together, then changes; the last is the residual."""
+    """Inner products of whitened columns [m]: first the `laws` columns of the law's discrepancy, then the baseline's
+    other free columns (`base` counts both), then changes; the last is the residual."""
 
     matrix: FloatArray  # [m, m] without gains
     along: FloatArray  # [R, k, m] along the directions of the curves of each run (`noise.covariance.Gains`)
@@ -64,7 +65,8 @@ class Gram:
     screened: Crossed | None = None
 
     def reduced(self, run_gain: float, curve_gain: float) -> "Reduced":
-        """What is left once the gains, scattering so, and all that the baseline has free but the law are taken off."""
+        """The Gram matrix with the gains (runs' scatter `run_gain`, curves' `curve_gain`) integrated out and the
+        baseline's free columns, except the law's, projected off."""
         root = scatter_root(self.overlaps.shape[-1], run_gain, curve_gain)
         factor = np.linalg.cholesky(np.eye(root.shape[1]) + root.T @ self.overlaps @ root)
         removed = np.linalg.solve(factor, root.T @ self.along).reshape(-1, self.matrix.shape[1])
@@ -96,8 +98,8 @@ class Gram:
         )
 
     def covariance(self, noise: Noise, *, exact: bool = False) -> FloatArray:
-        """[base - laws, base - laws] of all that the baseline has free beside the law, with a noise's gains and sizes of the
-        law, or with the `exact` law."""
+        """Covariance [base - laws, base - laws] of the baseline's free parameters beside the law's discrepancy, under a
+        noise's gains and sizes of the law, or under the `exact` law."""
         sizes = EXACT if exact else noise.law
         given = replace(self, base=self.laws, screened=None).reduced(noise.run_gain, noise.curve_gain)
         count = self.base - self.laws
@@ -117,7 +119,8 @@ class _Factored:
 
     @classmethod
     def of(cls, matrix: FloatArray, ridge: float) -> "_Factored":
-        """A correlation matrix may be singular to rounding: more of a ridge than rounding would change determinants."""
+        """The inverse factor of a matrix [b, b] with a `ridge` on its scaled diagonal: a correlation matrix may be
+        singular to rounding, and more of a ridge than rounding would change determinants."""
         scale = 1 / np.sqrt(np.maximum(np.diag(matrix), 1e-300))
         factor = np.linalg.cholesky(matrix * scale[:, None] * scale + ridge * np.eye(scale.size))
         return cls(np.asarray(dtrtri(factor, lower=True)[0] if scale.size else factor, dtype=np.float64), scale)
@@ -128,7 +131,7 @@ class _Factored:
 
     @property
     def log_determinant(self) -> float:
-        """Of the matrix [nats]."""
+        """ln det of the matrix [nats]."""
         return -2.0 * float(np.log(np.diag(self.inverse)).sum() + np.log(self.scale).sum())
 
 
@@ -140,8 +143,9 @@ def gram_of(
     screened: FloatArray | None = None,
     exact: bool = True,
 ) -> Gram:
-    """The Gram matrix of a fit (its effects belong to the baseline then) and changes [N, m] at the rows, none if None, with
-    columns [N, s] that are only `screened`. Templates that are not `exact` have their discrepancies in the baseline too."""
+    """The Gram matrix of a fit, with changes [N, m] at the rows (none if None) and columns [N, s] that are only
+    `screened`. The fit's effects count as baseline; where their templates are not `exact`, so do the templates'
+    discrepancies."""
     design, noise = problem.design, problem.noise
     nothing = np.zeros((design.torque.size, 0))
     law = nothing if problem.law is None else problem.law.columns
@@ -177,7 +181,7 @@ GAINS: FloatArray = np.geomspace(criteria.LEAST_GAIN, criteria.MOST_GAIN, 13)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Screened:
-    """Of columns [s] that are screened one by one."""
+    """Information and score of columns [s] that are screened one by one."""
 
     info: FloatArray  # [s]
     score: FloatArray  # [s]
@@ -186,8 +190,8 @@ class Screened:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Projected:
-    """What is left of changes [m] once the baseline and the law's discrepancy are projected off, at one scatter of the gains
-    and one size of the discrepancy."""
+    """Information, score and evidence of changes [m] with the baseline and the law's discrepancy projected off, at one
+    scatter of the gains and one size of the discrepancy."""
 
     info: FloatArray  # [m, m]
     score: FloatArray  # [m]
@@ -208,8 +212,8 @@ class Projected:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reduced:
-    """What is left of the law's columns [k], the changes [m] and the residual at one scatter of the gains, the baseline but
-    for the law projected off; of screened columns [s] likewise."""
+    """Gram matrix of the law's columns [k], the changes [m] and the residual at one scatter of the gains, with the
+    baseline except the law projected off; and the same of screened columns [s]."""
 
     gram: Gram
     matrix: FloatArray  # [k + m + 1, k + m + 1]
@@ -223,7 +227,7 @@ class Reduced:
     screened_whole: FloatArray | None = None  # [s]
 
     def beside_law(self, sizes: LawSizes, log_weight: float = 0.0) -> Projected:
-        """With the law off by such sizes, of a log prior."""
+        """The projection with the law's discrepancy of these sizes, of log prior `log_weight`, integrated out."""
         gram, laws = self.gram, self.gram.laws
         deviations = gram.law.form.deviations(sizes) if gram.law is not None else np.zeros(0)
         used = np.flatnonzero(deviations > 0.0)
@@ -259,7 +263,8 @@ class Reduced:
         )
 
     def law_coefficients(self, sizes: LawSizes) -> tuple[FloatArray, FloatArray]:
-        """Mean [k] and root [k, j] of the covariance of the law's coefficients, all else that is free integrated out."""
+        """Posterior mean [k] and root [k, j] of the covariance of the law's coefficients, all other free parameters
+        integrated out."""
         laws = self.gram.laws
         deviations = self.gram.law.form.deviations(sizes) if self.gram.law is not None else np.zeros(0)
         values, vectors = independent(deviations[:, None] * self.matrix[:laws, :laws] * deviations)
@@ -268,8 +273,9 @@ class Reduced:
 
 
 def likely_sizes(reduced: Reduced) -> dict[LawSizes, float]:
-    """The sizes of the law that count at a scatter of the gains, with their log priors, likeliest first: those of more than
-    NEGLIGIBLE_SIZES of the posterior, and of each size's values the best, for beside a change another may be likelier."""
+    """The sizes of the law's discrepancy of non-negligible posterior at a scatter of the gains, with their log priors,
+    likeliest first. These have more than NEGLIGIBLE_SIZES of the posterior; the best of each single value is kept too,
+    because another may be likelier beside a change."""
     if reduced.gram.law is None:
         return {EXACT: 0.0}
     alone = np.r_[0 : reduced.gram.laws, -1]
@@ -289,16 +295,18 @@ def likely_sizes(reduced: Reduced) -> dict[LawSizes, float]:
 
 
 def projections_of(gram: Gram, noise: Noise, gains: FloatArray | None = None) -> list[Projected]:
-    """With every scatter of the gains that is considered (of the runs' gains: `gains`; of the curves' up to what the noise
-    has or next above: where the data ask for none without an effect, they do not with one) and the law's likely sizes."""
+    """Projections at every scatter of the gains considered and at the law's likely sizes. Scatters of the runs' gains
+    are `gains`; those of the curves' go up to the next above the noise's: where the data ask for none without an
+    effect, they do not with one."""
     place = int(np.searchsorted(criteria.CURVE_GAINS, noise.curve_gain))  # 0 for none
     curves = criteria.CURVE_GAINS[: place + 2 if place else 1]
     return _projections(gram, noise, curves, GAINS if gains is None else gains)
 
 
 def projections_beside(gram: Gram, noise: Noise) -> list[Projected]:
-    """At every second scatter of the runs' gains, with the curves' as estimated without an effect and with none (an effect
-    may be what made them scatter), and at the law's likely sizes."""
+    """Projections at every second scatter of the runs' gains, with the curves' scatter as estimated without an effect
+    and with none, at the law's likely sizes. None, because an effect may be the reason for the curves' estimated
+    scatter."""
     return _projections(gram, noise, sorted({noise.curve_gain, 0.0}), GAINS[::2])
 
 
@@ -310,7 +318,8 @@ def _projections(gram: Gram, noise: Noise, curves: Sequence[float], gains: Float
 
 
 def likely_curve_gain(gram: Gram, sizes: LawSizes) -> float:
-    """The likeliest scatter of the curves' gains beside the law's sizes; none where another is not clearly likelier."""
+    """The scatter of the curves' gains [-] of highest evidence beside the law's sizes; 0 unless it is clearly
+    likelier."""
     best = [
         max(project(gram, gain, curve, sizes).evidence for gain in GAINS.tolist()) for curve in criteria.CURVE_GAINS
     ]
@@ -319,12 +328,14 @@ def likely_curve_gain(gram: Gram, sizes: LawSizes) -> float:
 
 
 def project(gram: Gram, run_gain: float, curve_gain: float, sizes: LawSizes = EXACT) -> Projected:
-    """With the runs' gains scattering by `run_gain`, those of the curves by `curve_gain`, the law off by such sizes."""
+    """The projection at scatter `run_gain` of the runs' gains, `curve_gain` of the curves', and these sizes of the
+    law's discrepancy."""
     return gram.reduced(run_gain, curve_gain).beside_law(sizes)
 
 
 def isolability(problem: FitProblem, fit: PooledFit, changes: FloatArray, sizes: LawSizes) -> FloatArray:
-    """ι [m] of changes [N, m] beside the law's sizes, at the noise's scatter of the gains."""
+    """Isolability ι [m] of changes [N, m] beside a law's discrepancy of these sizes, at the noise's scatter of the
+    gains."""
     reduced = gram_of(problem, fit, screened=changes).reduced(problem.noise.run_gain, problem.noise.curve_gain)
     beside, exact = (reduced.beside_law(size).screened for size in (sizes, EXACT))
     if beside is None or exact is None:
@@ -340,7 +351,7 @@ def log_gain_prior(run_gain: float) -> float:
 
 
 def amplitude_deviations(problem: FitProblem, fitted: PooledFit) -> list[float]:
-    """Standard deviations of the amplitudes of the fit's effects, everything else free."""
+    """Standard deviations of the amplitudes of the fit's effects, all other parameters free."""
     inverse = gram_of(problem, fitted, exact=False).covariance(problem.noise)
     sizes = [0, *(effect.precisions.size for effect in fitted.effects[:-1])]
     places = int(problem.priors.free.sum()) + np.cumsum(sizes)[: len(fitted.effects)]
@@ -349,7 +360,8 @@ def amplitude_deviations(problem: FitProblem, fitted: PooledFit) -> list[float]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunScatter:
-    """Relative scatter of the runs' gains [-]: median, 90 % interval, and what data say of it beyond the prior [nats]."""
+    """Relative scatter of the runs' gains [-]: posterior median and 90 % interval, and the information that the data
+    add to the prior [nats]."""
 
     median: float
     lower: float
@@ -358,12 +370,12 @@ class RunScatter:
 
     @property
     def assumed(self) -> bool:
-        """Whether it is the prior, for the data hardly say more."""
+        """Whether the estimate is in effect the prior, because the data add too little information."""
         return self.information < criteria.LEAST_SCATTER_INFORMATION
 
 
 def run_scatter(projections: Sequence[Projected]) -> RunScatter:
-    """The estimate from projections at every scatter that is considered (`projections_of`)."""
+    """Posterior of the runs' gain scatter from projections at every scatter considered (`projections_of`)."""
     gains = np.unique([projected.run_gain for projected in projections])
     by_gain = [
         float(logsumexp([projected.evidence for projected in projections if projected.run_gain == gain]))
@@ -378,8 +390,8 @@ def run_scatter(projections: Sequence[Projected]) -> RunScatter:
 
 
 def without_likely_gains(problem: FitProblem, fitted: PooledFit) -> FloatArray:
-    """The residual [N] Nm less what the likeliest gains of runs and curves make of it: r - M ĝ with the best linear
-    prediction ĝ = K Mᵀ V⁻¹ r, the law taken for exact."""
+    """Residual [N] Nm minus the best linear prediction of the gains of runs and curves, r - M ĝ with ĝ = K Mᵀ V⁻¹ r,
+    the law taken for exact."""
     noise = problem.noise
     gains = gains_of(problem.design, fitted.torque, noise)
     white = whitened(fitted.residual[:, None], problem.design, noise)
@@ -390,8 +402,8 @@ def without_likely_gains(problem: FitProblem, fitted: PooledFit) -> FloatArray:
 
 
 def learned_law(problem: FitProblem, fitted: PooledFit) -> LearnedLaw | None:
-    """The likeliest discrepancy of the law in a fit's residual r, at the noise's sizes: T (1 + Bᵀ B)⁻¹ Bᵀ V^{-1/2} r with B
-    the columns C T whitened beside noise and gains; None where the law is exact."""
+    """The posterior mean of the law's discrepancy from a fit's residual r, at the noise's sizes: T (1 + Bᵀ B)⁻¹ Bᵀ
+    V^{-1/2} r with B the columns C T whitened beside noise and gains; None where the law is exact."""
     if problem.law is None or problem.noise.law == EXACT:
         return None
     deviations = problem.law.discrepancy.form.deviations(problem.noise.law)
@@ -402,7 +414,7 @@ def learned_law(problem: FitProblem, fitted: PooledFit) -> LearnedLaw | None:
 
 
 def law_torque(problem: FitProblem, fitted: PooledFit) -> FloatArray:
-    """The likeliest discrepancy of the law [N] Nm at the rows."""
+    """Torque [N] Nm at the rows of the law's posterior mean discrepancy."""
     learned = learned_law(problem, fitted)
     if learned is None or problem.law is None:
         return np.zeros(fitted.residual.size)
@@ -410,5 +422,5 @@ def law_torque(problem: FitProblem, fitted: PooledFit) -> FloatArray:
 
 
 def left_over(problem: FitProblem, fitted: PooledFit) -> FloatArray:
-    """The residual [N] Nm less what the likeliest discrepancy of the law and the likeliest gains make of it."""
+    """Residual [N] Nm minus the torque of the law's posterior mean discrepancy and of the likeliest gains."""
     return without_likely_gains(problem, replace(fitted, residual=fitted.residual - law_torque(problem, fitted)))

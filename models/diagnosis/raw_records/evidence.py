@@ -43,7 +43,8 @@ Run = TypeVar("Run", StationaryRun, DynamicRun)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RawEvidence:
-    """Of one effect: log_evidence [nats] against none, its amplitude, and a sentence on how it shows."""
+    """Raw-record evidence of one effect: log_evidence [nats] against none, its amplitude, and a sentence on how it
+    shows."""
 
     effect: str
     log_evidence: float
@@ -52,8 +53,8 @@ class RawEvidence:
 
 
 def raw_evidence(campaign: Campaign, without: frozenset[str] = frozenset()) -> tuple[RawEvidence, ...]:
-    """What the raw records of a campaign show; nothing where there are none or they are too slow or too short. A swing of a
-    kind that the catalogue is `without` has no name."""
+    """Evidence of swings and unsettled dwells in a campaign's raw records; empty where there are none or they are too
+    slow or too short. A swing of a kind that the catalogue is `without` has no name."""
     stationary = [(run, run.record) for run in campaign.stationary if run.record is not None]
     dwells = list[tuple[Record, PlateauCut]]()
     for _, record in _evenly(stationary):
@@ -67,7 +68,7 @@ def raw_evidence(campaign: Campaign, without: frozenset[str] = frozenset()) -> t
 
 
 def _evenly(runs: Sequence[tuple[Run, Record]]) -> Sequence[tuple[Run, Record]]:
-    """Runs evenly over life, as many as hold few enough samples."""
+    """Runs spread evenly over life, as many as the limit on samples allows."""
     usual = float(np.median([record.time.size for _, record in runs])) if runs else 1.0
     most = max(8, int(300_000 / usual))  # eight at least, more where they hold fewer than 300,000 samples in all
     if len(runs) <= most:
@@ -76,7 +77,8 @@ def _evenly(runs: Sequence[tuple[Run, Record]]) -> Sequence[tuple[Run, Record]]:
 
 
 def _swings(records: list[WhitenedRecord]) -> list[RawEvidence]:
-    """Of ripple, and of a line of one frequency: stick-slip where only low speeds have it, else a note.
+    """Evidence of shaft ripple, and of a line of one frequency: stick-slip where only low speeds have it, else a line
+    without a name.
 
     The one with more evidence is taken out of the records before the other is looked for again.
     """
@@ -101,7 +103,7 @@ def _swings(records: list[WhitenedRecord]) -> list[RawEvidence]:
 
 
 def _fixed_line(records: list[WhitenedRecord], order: Line | None) -> tuple[Line, bool]:
-    """The best line, and whether it is at low speed only: there, and not where the shaft is much faster."""
+    """The best line, and whether it is limited to low speed: found there, and not where the shaft is much faster."""
     slow = best_slow_line(records, order)
     if slow.evidence <= LEAST_EVIDENCE:
         return best_line(records, order), False
@@ -120,7 +122,7 @@ def _line_evidence(effect: str, line: Line, name: str, note: str) -> RawEvidence
 
 
 def _unsettled(dwells: list[tuple[Record, PlateauCut]]) -> list[RawEvidence]:
-    """Dwells that ended before torque had settled, by the evidence of all their transients together: one that looks late
+    """Evidence of dwells that ended before torque had settled, from all their transients together: one that looks late
     without it adds nothing."""
     evidence, constant = settling_evidence(dwells)
     if evidence <= LEAST_EVIDENCE:

@@ -27,7 +27,8 @@ _USUAL_SHARE = 0.2
 
 
 def settling_evidence(dwells: Iterable[tuple[Record, PlateauCut]]) -> tuple[float, AmplitudeEstimate]:
-    """Evidence [nats] of slow settling transients over none, by all dwells together, and their time constant τ [s]."""
+    """Log Bayes factor [nats] of slow settling transients over none, from all dwells together, and their time constant
+    τ [s]."""
     times = np.array([*_FAST_TIMES, *_SLOW_TIMES])
     gram, along = np.zeros((times.size, times.size)), np.zeros(times.size)
     for record, cut in dwells:
@@ -64,7 +65,8 @@ def settling_evidence(dwells: Iterable[tuple[Record, PlateauCut]]) -> tuple[floa
 
 
 def _transients(record: Record, cut: PlateauCut) -> Iterator[tuple[FloatArray, FloatArray, float]]:
-    """Time since the step [n] s, torque off its mean [n] Nm and the step before [Nm], of each dwell but the first."""
+    """The transient of each dwell but the first: time since the step [n] s, torque minus its mean [n] Nm, and the step
+    before [Nm]."""
     means, speeds = cut.plateaus.torque, cut.plateaus.speed
     for i in range(1, means.size):
         rows = np.flatnonzero((record.time > cut.stop[i - 1]) & (record.time <= cut.stop[i]))

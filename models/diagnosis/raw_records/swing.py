@@ -37,7 +37,7 @@ ComplexArray: TypeAlias = NDArray[np.complex128]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Line:
-    """A swing at an order of the shaft or at a frequency; without arguments none."""
+    """A swing at an order of the shaft or at a frequency; the default value is none."""
 
     evidence: float = 0.0  # [nats], averaged over everything tried
     position: float = 0.0  # the order [per revolution] or the frequency [Hz]
@@ -63,7 +63,7 @@ _TABLE_SLOPE = np.diff(_TABLE, append=_TABLE[-1])
 
 
 def rice(power: FloatArray, lam: FloatArray) -> FloatArray:
-    """log L(a)/L(0) of power u >= 0 at λ >= 0, broadcast."""
+    """Log likelihood ratio log L(a)/L(0) of power u >= 0 at λ >= 0 (Rice), broadcast."""
     root = 2.0 * np.sqrt(power * lam)
     return np.asarray(_log_bessel(root) - lam, dtype=np.float64)
 
@@ -80,7 +80,7 @@ def _log_bessel(x: FloatArray) -> FloatArray:
 
 
 def trial_amplitudes(weight: FloatArray) -> FloatArray:
-    """a [s] to be tried for stretches of weight N [j] or, each column by itself, N [j, f]: [s] or [s, f]."""
+    """Trial amplitudes a [s] for stretches of weight N [j], or [s, f] for N [j, f], each column by itself."""
     # λ contributes λ²/2 where it is small, and itself where it is large
     # all stretches together show about 4 nats at amplitude 1
     faint = np.sqrt(2 * 4.0 / np.maximum(np.square(weight).sum(axis=0), 1e-300))
@@ -88,12 +88,13 @@ def trial_amplitudes(weight: FloatArray) -> FloatArray:
 
 
 def log_likelihood_ratios(power: FloatArray, weight: FloatArray, amplitudes: FloatArray) -> FloatArray:
-    """log L(a)/L(0) [s] (or [s, f]) of u and N [j] (or [j, f]) at a [s] (or [s, f])."""
+    """Log likelihood ratios log L(a)/L(0) [s] (or [s, f]) of u and N [j] (or [j, f]) at amplitudes a [s] (or
+    [s, f])."""
     return np.stack([np.minimum(rice(power, 0.25 * weight * a**2), MOST_PER_STRETCH).sum(axis=0) for a in amplitudes])
 
 
 def amplitude(power: FloatArray, weight: FloatArray) -> float:
-    """a of u and N [j] by their means: E u = 1 + a² N/4."""
+    """Moment estimate of the amplitude a from the means of u and N [j]: E u = 1 + a² N/4."""
     return float(2.0 * np.sqrt(max(float((power - 1.0).sum()), 0.0) / max(float(weight.sum()), 1e-300)))
 
 
@@ -111,7 +112,8 @@ Demodulated: TypeAlias = tuple[ComplexArray, FloatArray]
 
 
 def best_order(records: Sequence[WhitenedRecord], line: Line | None = None) -> Line:
-    """The evidence of ripple and its best order; samples in which `line` would lie on the order are left out."""
+    """The shaft order of highest evidence as a line, with the evidence of ripple averaged over all orders; samples in
+    which `line` would lie on the order are left out."""
     stretches, groups = _stretches(records)
     sizes = _relative_sizes(records, stretches)
     orders = sorted({round(k + side * offset, 1) for k in ORDERS for side in (-1.0, 0.0, 1.0) for offset in _BESIDE})
@@ -133,8 +135,9 @@ def best_order(records: Sequence[WhitenedRecord], line: Line | None = None) -> L
 
 
 def _stretches(records: Sequence[WhitenedRecord]) -> tuple[list[IntArray], dict[int, IntArray]]:
-    """The first samples of each record's stretches; and for each number of stretches over which a swing keeps its phase,
-    where its groups begin, as indices of the stretches of all records. No group goes on over a gap in a record."""
+    """First samples of each record's stretches; and for each number of stretches over which a swing keeps its phase,
+    the first stretches of its groups, as indices of the stretches of all records. No group goes on over a gap in a
+    record."""
     starts, groups, stretches_before = [], {kept: list[IntArray]() for kept in _COHERENT}, 0
     for record in records:
         own = []
@@ -150,8 +153,8 @@ def _stretches(records: Sequence[WhitenedRecord]) -> tuple[list[IntArray], dict[
 
 
 def _relative_sizes(records: Sequence[WhitenedRecord], stretches: list[IntArray]) -> dict[str, FloatArray]:
-    """What a swing's size [b] in the stretches is in proportion to, by law: speed, or the root of the load; both relative to
-    their root mean square."""
+    """Relative amplitude [b] of a swing in the stretches, by law: proportional to speed, or to the root of the load,
+    each relative to its root mean square."""
     sizes = {}
     for law, name in (("load", "torque"), ("speed", "speed")):
         channels = [getattr(record, name) for record in records]
@@ -167,7 +170,7 @@ def _relative_sizes(records: Sequence[WhitenedRecord], stretches: list[IntArray]
 def _demodulated(
     records: Sequence[WhitenedRecord], stretches: list[IntArray], orders: list[float], line: Line | None
 ) -> dict[float, Demodulated]:
-    """D and N of every order (multiples of a tenth, ascending)."""
+    """Demodulated sums D and weights N of every order (multiples of a tenth, ascending)."""
     highest = max(float(np.abs(record.speed).max()) for record in records)
     parts: dict[float, list[tuple[FloatArray, FloatArray]]] = {order: [] for order in orders}
     for record, firsts in zip(records, stretches, strict=True):
@@ -204,14 +207,15 @@ def _demodulated(
 
 
 def _powers(order: Demodulated, size: FloatArray, firsts: IntArray) -> tuple[FloatArray, FloatArray]:
-    """u and N of the groups in which the order is visible."""
+    """Power u and weight N of the groups in which the order is visible."""
     total, weight = np.add.reduceat(order[0] * size, firsts), np.add.reduceat(order[1] * size**2, firsts)
     visible = weight > 0
     return np.abs(total[visible]) ** 2 / weight[visible], weight[visible]
 
 
 def _order_evidence(demodulated: dict[float, Demodulated], order: float, size: FloatArray, firsts: IntArray) -> Line:
-    """The evidence of an order whose relative size is as given, its phase kept within the groups."""
+    """The line at an order, with its evidence, for a relative amplitude `size` [b] and a phase kept within the
+    groups."""
     power, weight = _powers(demodulated[order], size, firsts)
     if power.size < 4:
         return Line()
@@ -297,7 +301,8 @@ def windows_of(
 def _spectrum_of(
     record: WhitenedRecord, first: int, stop: int, frequency: FloatArray
 ) -> tuple[IntArray, ComplexArray, FloatArray]:
-    """Which of the frequencies [f] Hz the record shows in the window of samples [first, stop), and D and N there."""
+    """Indices of the frequencies [f] Hz that the record shows in the window of samples [first, stop), and D and N
+    there."""
     inside = (frequency > _COMPARED_ABOVE * record.lowest) & (frequency < record.highest)
     size = round(1.0 / (_SPACING * record.step))
     slot = np.minimum(np.round((record.time[first:stop] - record.time[first]) / record.step).astype(int), size - 1)
@@ -332,8 +337,8 @@ _PHASES, _LAGS = 16, 6
 
 
 def best_slow_line(records: Sequence[WhitenedRecord], order: Line | None = None) -> Line:
-    """The evidence of a line at low speed, its size by the load's root; windows in which `order` passes its frequency are
-    left out."""
+    """The line of highest evidence at low speed, its amplitude proportional to the load's root; windows in which
+    `order` passes its frequency are left out."""
     lines = []
     for share in _SLOW_SHARES:
         windows = windows_of(records, share, 2.5, 45.0)  # windows of 2.5 s, frequencies up to 45 Hz
@@ -347,14 +352,14 @@ def best_slow_line(records: Sequence[WhitenedRecord], order: Line | None = None)
 
 
 def best_line(records: Sequence[WhitenedRecord], order: Line | None = None, above: float = 0.0) -> Line:
-    """The evidence of a line at all speeds alike, or at all above a share of the highest."""
+    """The line of highest evidence at all speeds alike, or at all above a share of the highest."""
     windows = windows_of(records, 1.0, 2.0, np.inf, above)
     return Line() if windows is None else _line(windows, np.ones_like(windows.torque), order, 1.0)
 
 
 def _line(windows: Windows, size: FloatArray, order: Line | None, share: float) -> Line:
-    """The evidence of a line in these windows, its relative size in each [w], averaged over all frequencies with a prior
-    ∝ 1/f; with a second harmonic in it at low speed."""
+    """The line of highest evidence in these windows, for a relative amplitude [w], with evidence averaged over all
+    frequencies by a prior ∝ 1/f; at low speed it may have a second harmonic."""
     clear = _clear_of_order(windows, order)
     visible, beside = windows.visible & clear, windows.beside & clear
     least = max(_FEWEST_WINDOWS, 0.3 * visible.shape[0])
@@ -386,7 +391,8 @@ def _line(windows: Windows, size: FloatArray, order: Line | None, share: float) 
 def _log_likelihoods(
     power: FloatArray, sums: ComplexArray, weight: FloatArray, frequencies: IntArray, *, second_harmonic: bool
 ) -> FloatArray:
-    """log L(a)/L(0) [2, s, f] without and with a second harmonic, the log of their prior probabilities included.
+    """Log likelihood ratios log L(a)/L(0) [2, s, f] without and with a second harmonic, the log of their prior
+    probabilities included.
 
     At the frequencies where a second harmonic promises most its phase is tied to the first's; elsewhere it is free."""
     amplitudes = trial_amplitudes(weight[:, frequencies])
@@ -405,7 +411,8 @@ def _log_likelihoods(
 
 
 def _tied(sums: ComplexArray, weight: FloatArray, amplitudes: FloatArray) -> FloatArray:
-    """log L(a)/L(0) [s] of a first and a second harmonic, D and N [w, 2], whose phases keep a lag ψ that all windows share:
+    """Log likelihood ratios log L(a)/L(0) [s] of a first and a second harmonic, D and N [w, 2], whose phases keep a lag
+    ψ that all windows share:
 
     Σ_w ln mean_φ exp(a Re[D₁ e^{-iφ} + q D₂ e^{-i(2φ + ψ)}] - a² (N₁ + q² N₂)/4),   averaged over ψ
     """
@@ -424,7 +431,7 @@ def _tied(sums: ComplexArray, weight: FloatArray, amplitudes: FloatArray) -> Flo
 
 
 def _clear_of_order(windows: Windows, order: Line | None) -> Bools:
-    """[w, f]: false where the order, or its double, passes the frequency in the window."""
+    """Mask [w, f], false where the order, or its double, passes the frequency in the window."""
     frequency = _SPACING * np.arange(windows.sums.shape[1])
     if order is None:
         return np.ones(windows.sums.shape, dtype=np.bool_)
@@ -435,7 +442,7 @@ def _clear_of_order(windows: Windows, order: Line | None) -> Bools:
 
 
 def _noise_levels(power: FloatArray, beside: Bools, independent: float) -> FloatArray:
-    """The mean of u [f] beside each frequency: that of the louder side, 1 unless many windows show another.
+    """Noise level [f] beside each frequency, the mean of u on the louder side; 1 unless many windows show another.
 
     Where it is louder, something other than noise remains, with crests of its own: there it is the highest crest.
     `independent` is how many independent values a bin counts for."""
@@ -455,6 +462,6 @@ def _noise_levels(power: FloatArray, beside: Bools, independent: float) -> Float
 
 
 def _smoothed(total: FloatArray, count: FloatArray, width: int, independent: float, prior: float) -> FloatArray:
-    """The mean of u [f] over `width` bins, 1 unless more than `prior` windows show another."""
+    """Moving mean of u [f] over `width` bins, shrunk towards 1 by a weight of `prior` windows."""
     sums, counts = (independent * width * uniform_filter1d(values, width, mode="constant") for values in (total, count))
     return np.asarray((sums + prior) / (counts + prior))

@@ -37,7 +37,7 @@ REVERSES = 0.03
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RecordPiece:
-    """Consecutive samples [n]: time [s], speed [rad/s], torque [Nm]."""
+    """A piece of a record, consecutive samples [n]: time [s], speed [rad/s], torque [Nm]."""
 
     time: FloatArray
     speed: FloatArray
@@ -45,8 +45,8 @@ class RecordPiece:
 
 
 def pieces_of(record: Record, spans: FloatArray | None, period: float, count: int) -> list[RecordPiece]:
-    """The pieces of a record with a sample every `period` [s], means of `count` samples each; within spans [k, 2] s where
-    they are given, else where its pressure is constant."""
+    """Pieces of a record with a sample every `period` [s], as means of `count` samples each; within spans [k, 2] s
+    where they are given, else where its pressure is constant."""
     turned = round(1.0 / period)  # torque has settled 1 s after
     return [
         _averaged(record, first, stop, count)
@@ -57,7 +57,7 @@ def pieces_of(record: Record, spans: FloatArray | None, period: float, count: in
 
 
 def _without_gaps(record: Record, spans: FloatArray | None, period: float) -> Iterator[tuple[int, int]]:
-    """Rows [first, stop) without gaps."""
+    """Row ranges [first, stop) of the spans, split at gaps in the record."""
     gaps = (np.flatnonzero(np.diff(record.time) > 5 * period) + 1).tolist()  # samples that may be missing in a row
     if spans is None:
         for first, stop in itertools.pairwise([0, *gaps, record.time.size]):
@@ -69,7 +69,7 @@ def _without_gaps(record: Record, spans: FloatArray | None, period: float) -> It
 
 
 def _at_one_pressure(record: Record, first: int, stop: int) -> Iterator[tuple[int, int]]:
-    """Rows of [first, stop), which have no gaps, at which the pressure is constant."""
+    """Row ranges of constant pressure within [first, stop), which has no gaps."""
     if stop - first < FEWEST_SAMPLES:
         return
     pressure = record.pressure[first:stop]
@@ -83,8 +83,8 @@ def _at_one_pressure(record: Record, first: int, stop: int) -> Iterator[tuple[in
 
 
 def _one_direction(speed: FloatArray, first: int, stop: int, turned: int) -> Iterator[tuple[int, int]]:
-    """Rows of [first, stop) between reversals of the speed, from `turned` rows after each on: where the clutch reverses the
-    torque jumps, at the same angle of the shaft each time, which would pass for a ripple."""
+    """Row ranges [first, stop) between reversals of the speed, each from `turned` rows after the reversal on: where the
+    clutch reverses the torque jumps, at the same angle of the shaft each time, which would pass for a ripple."""
     part = speed[first:stop]
     if min(part.max(initial=0.0), -part.min(initial=0.0)) <= REVERSES * np.abs(part).max(initial=0.0):
         yield first, stop
@@ -96,7 +96,7 @@ def _one_direction(speed: FloatArray, first: int, stop: int, turned: int) -> Ite
 
 
 def _averaged(record: Record, first: int, stop: int, count: int) -> RecordPiece:
-    """The rows [first, stop), means of `count` each."""
+    """A piece of the rows [first, stop), as means of `count` each."""
     stop = first + (stop - first) // count * count
     time, speed, torque = (channel[first:stop] for channel in (record.time, record.speed, record.torque))
     if count > 1:
@@ -106,7 +106,7 @@ def _averaged(record: Record, first: int, stop: int, count: int) -> RecordPiece:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WhitenedRecord:
-    """The samples [n] of a record's pieces, one after the other."""
+    """Whitened torque of a record's pieces, samples [n], concatenated."""
 
     time: FloatArray  # [s]
     speed: FloatArray  # [rad/s]
@@ -123,14 +123,14 @@ class WhitenedRecord:
         return HIGHEST_SHARE / self.step
 
     def response(self, frequency: FloatArray) -> FloatArray:
-        """|A|² at frequencies [Hz] up to half the rate; beyond, the last value."""
+        """Squared gain |A|² of the whitening filter at frequencies [Hz] up to half the rate; beyond, the last value."""
         place = frequency * (2 * (self.gain.size - 1) * self.step)
         return np.asarray(self.gain[np.minimum(place, self.gain.size - 1).astype(np.intp)])
 
 
 def whitened_record(record: Record, spans: FloatArray | None = None) -> WhitenedRecord | None:
-    """Of a record, within spans [k, 2] s where they are given, else where its pressure is constant; None where it holds too
-    few samples, or samples too far apart."""
+    """Whitened torque of a record, within spans [k, 2] s where they are given, else where its pressure is constant;
+    None where it holds too few samples, or samples too far apart."""
     try:
         cleaned, period, _ = clean(record)
     except UnusableRecordError:
@@ -164,7 +164,8 @@ def _speed_period(speed: FloatArray, step: float) -> float:
 
 
 def _whitened(pieces: Sequence[RecordPiece], step: float, between: int, least_variance: float) -> WhitenedRecord | None:
-    """None where noise is too small beside the recorder's steps (its median variance at most `least_variance` [Nm²])."""
+    """Pieces whitened by a common autoregression; None where noise is too small beside the recorder's steps (its median
+    variance at most `least_variance` [Nm²])."""
     from scipy.signal import lfilter  # start-up time
 
     smooth = [_spline(piece.torque, between) for piece in pieces]
@@ -200,7 +201,7 @@ def _whitened(pieces: Sequence[RecordPiece], step: float, between: int, least_va
 
 
 def _weight(innovations: FloatArray, order: int, local: int, least: float) -> FloatArray:
-    """1/σ² [n] of innovations [n], 0 for the first `order`, which lack their past."""
+    """Weights 1/σ² [n] of innovations [n] by their local variance, 0 for the first `order`, which lack their past."""
     squares = innovations**2
     squares[:order] = squares[order:].mean()
     squares = np.minimum(squares, 12.0 * squares.mean())
@@ -218,7 +219,8 @@ def _spline(torque: FloatArray, between: int) -> FloatArray:
 
 
 def _autoregression(series: Sequence[FloatArray], lowest: float) -> FloatArray:
-    """A [p + 1] (Yule-Walker) for series whose spectrum below `lowest` [cycles a sample] goes on flat as it is above."""
+    """Coefficients A [p + 1] of an autoregression (Yule-Walker) for series whose spectrum is continued flat below
+    `lowest` [cycles a sample]."""
     size = min(256, min(part.size for part in series))
     window = np.hanning(size)
     segments = [part[first : first + size] for part in series for first in range(0, part.size - size + 1, size // 2)]

@@ -38,7 +38,8 @@ def candidates_of(
     sizes: Mapping[str, Size],
     isolability: Mapping[str, float],
 ) -> tuple[Candidate, ...]:
-    """Each effect as the verdict has it, else alone, else beside the one that it goes with best."""
+    """Candidates of the report, one for each effect: by the verdict's fit, else alone, else beside its best
+    companion."""
     records = {record.effect: record for record in raw}
     alone = [fitted for fitted in judgement.others if len(fitted.slugs) == 1]
     candidates = []
@@ -79,7 +80,7 @@ def candidates_of(
 
 
 def _onset(fitted: FittedEffect) -> str:
-    """From which cycles on an effect is at work, in words; nothing where it is from the start."""
+    """The onset of an effect in words, in cycles; empty where it is at work from the start."""
     onset = fitted.effect.onset(fitted.shape)
     return "" if onset == FROM_THE_START else f"from about {number(onset)} cycles on"
 
@@ -114,7 +115,8 @@ ADOPT_NOTHING = "Adopt nothing before the next diagnosis."
 
 
 def reason_against(verdict: Verdict, gain: Gain | None, sizes: Sizes) -> str:
-    """Why an extension is not proposed, or nothing where one is or none was fitted. The verdict stays."""
+    """The reason why an extension is not proposed, as a sentence; empty where one is proposed or none was fitted. The
+    verdict stays."""
     if not sizes.draws:
         return ""
     if verdict is not Verdict.CAUSE_NAMED:
@@ -135,8 +137,8 @@ def reason_against(verdict: Verdict, gain: Gain | None, sizes: Sizes) -> str:
 
 
 def statistics_of(posterior: Posterior, judgement: Judgement, scatter: RunScatter) -> dict[str, float]:
-    """All finite numbers: the scatter from run to run, the log evidence [nats] of what is likeliest over nothing and the
-    same with its prior, the evidence of the strongest axis, refits."""
+    """Finite numbers of the computation by name: the run-to-run scatter, the log evidence [nats] of the most probable
+    alternative over nothing and the same with its prior, the evidence of the strongest axis, refits."""
     probabilities = posterior.probabilities
     best = next(iter(probabilities))
     numbers = {
@@ -164,7 +166,7 @@ def report_of(
     advice: tuple[Advice, ...],
     law: FrictionLaw | None,
 ) -> Report:
-    """Candidates, misfits, gain, advice, maps, loops, the friction law, extension, summary."""
+    """The report: candidates, misfits, gain, advice, maps, loops, the friction law, extension, summary."""
     problem, fitted = posterior.problem, posterior.null.fit
     reason = reason_against(judgement.verdict, gain, sizes)
     notes = _notes(baseline, posterior, judgement, raw)
@@ -211,7 +213,8 @@ def report_of(
 def _extension(
     problem: FitProblem, fitted: PooledFit, sizes: Sizes, gain: Gain | None, law: FrictionLaw | None
 ) -> Extension | None:
-    """What may be adopted: the causes at work, and the law as found where it is proposed; None without either."""
+    """The extension that may be adopted: the causes at work, and the law as found where it is proposed; None without
+    either."""
     learned = law.learned if law is not None and law.adoptable else None
     draws = sizes.draws if any(draw.effects for draw in sizes.draws) else ()
     if learned is not None and not draws:
@@ -225,7 +228,7 @@ def _extension(
 
 
 def insufficient(missing: str, design: Design) -> Report:
-    """Nothing can be judged."""
+    """The report of a campaign with too little data to judge."""
     summary = f"Too little data for a diagnosis: {missing}"
     return Report(verdict=Verdict.INSUFFICIENT_DATA, summary=summary, notes=design.notes)
 
@@ -233,7 +236,8 @@ def insufficient(missing: str, design: Design) -> Report:
 def _notes(
     baseline: Baseline, posterior: Posterior, judgement: Judgement, raw: Sequence[RawEvidence]
 ) -> tuple[str, ...]:
-    """Of the baseline, of raw records, of fits that did not end, and on an outlying run where the case is open."""
+    """Notes of the baseline, of raw records, of fits that did not converge, and on an outlying run where the case is
+    open."""
     notes = [*baseline.notes, *(f"{record.effect}: {record.note}." for record in raw)]
     ran_out = [cause for cause in judgement.stand if cause.fit.status is FitStatus.OUT_OF_STEPS]
     unfinished = [" and ".join(map(effect_name, cause.slugs)) for cause in ran_out]

@@ -50,8 +50,9 @@ class LawCurve:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FrictionLaw:
-    """The law's discrepancy: its relative rms [%] with its 90 % interval, the bands of speed in which it lies, what it
-    changes [%] (None where no course leads to an end), its gain on held-out runs over eq. 3, and curves."""
+    """The law's discrepancy: its relative rms [%] with its 90 % interval, the bands of speed in which it lies, its
+    effects on predictions [%] (None where no course leads to an end), its gain on held-out runs over eq. 3, and
+    curves."""
 
     rms_percent: float
     interval_percent: tuple[float, float]
@@ -65,18 +66,19 @@ class FrictionLaw:
 
     @property
     def mentioned(self) -> bool:
-        """Whether it is worth a sentence."""
+        """Whether the discrepancy is large and certain enough for a sentence."""
         return self.rms_percent >= criteria.LAW_MENTIONED and self.interval_percent[0] > 0.25 * self.rms_percent
 
     @property
     def predicts(self) -> bool:
-        """Whether it is worth a sentence and predicts held-out runs better than eq. 3."""
+        """Whether the discrepancy deserves a sentence and predicts held-out runs better than eq. 3."""
         gain = self.gain
         return self.mentioned and gain is not None and gain.log_score_gain > 0.0 and gain.rmse_after <= gain.rmse_before
 
 
 def friction_law_of(problem: FitProblem, fitted: PooledFit, rng: np.random.Generator) -> FrictionLaw | None:
-    """The discrepancy beside the effects of a fit; None where no plateau shows one."""
+    """The friction law's discrepancy from eq. 3 beside the effects of a fit; None where there is no plateau to show
+    one."""
     design = problem.design
     rows = np.flatnonzero(design.closed & design.rows.steady)
     if problem.law is None or rows.size == 0:
@@ -112,7 +114,7 @@ def friction_law_of(problem: FitProblem, fitted: PooledFit, rng: np.random.Gener
 
 
 def _draws(gram: Gram, projections: Sequence[Projected], rng: np.random.Generator) -> FloatArray:
-    """Coefficients [k, _DRAWS] of the posterior over the scatter of the gains and the law's sizes."""
+    """Posterior draws [k, _DRAWS] of the law's coefficients, over the scatter of the gains and the law's sizes."""
     logs = np.array([projected.evidence for projected in projections])
     weights = np.exp(logs - logs.max())
     counts = np.diff(np.floor(np.cumsum(weights / weights.sum()) * _DRAWS + 1e-9), prepend=0.0).astype(int)
@@ -126,7 +128,7 @@ def _draws(gram: Gram, projections: Sequence[Projected], rng: np.random.Generato
 
 
 def _bands(speed: FloatArray, relative: FloatArray) -> tuple[Band, ...]:
-    """Bands even in ln v with their shares of the squares of a relative discrepancy [n]."""
+    """Bands even in ln v, with their shares of the squares of a relative discrepancy [n], largest first."""
     edges = np.geomspace(speed.min(), speed.max() * (1.0 + 1e-9), _BANDS + 1)
     place = np.clip(np.searchsorted(edges, speed, side="right") - 1, 0, _BANDS - 1)
     squares = np.bincount(place, weights=relative**2, minlength=_BANDS)
@@ -139,7 +141,8 @@ def _bands(speed: FloatArray, relative: FloatArray) -> tuple[Band, ...]:
 
 
 def _of_remaining(exact: float, law: float) -> float | None:
-    """The change [%] of what remains, from the two ratios of the last to the first state; None where either has no end."""
+    """Relative change [%] of the remaining cycles, from the ratios of last to first mean torque by eq. 3 (`exact`) and
+    by the law; None where a ratio leads to no end."""
     if not (0.5 < exact < 1.0 and 0.5 < law < 1.0):
         return None
     remaining = [(ratio - 0.5) / (1.0 - ratio) for ratio in (exact, law)]
@@ -149,7 +152,8 @@ def _of_remaining(exact: float, law: float) -> float | None:
 def _curves(
     problem: FitProblem, alone: PooledFit, fitted: PooledFit, drawn: FloatArray, rows: np.ndarray
 ) -> tuple[LawCurve, ...]:
-    """The first and the last state at the lowest and the highest pressure, at the plateaus' own speeds."""
+    """Friction curves of the first and the last state at the lowest and the highest pressure, at the plateaus' own
+    speeds."""
     design = problem.design
     by_law = fitted.torque + law_torque(problem, fitted)
     curves = []

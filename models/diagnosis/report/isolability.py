@@ -46,8 +46,8 @@ from models.diagnosis.report.report import Isolability, Pair, Visible
 
 
 def visible_of(posterior: Posterior) -> tuple[Visible, ...]:
-    """What each effect would be seen by with a probability of VISIBLE_POWER: in whatever of its shapes, and in the one that
-    shows best. Infinite where a shape would be absorbed at any amplitude; effects of which nothing shows are left out."""
+    """Detectable amplitudes of each effect at a power of VISIBLE_POWER: in its hardest shape, and in the easiest one.
+    Infinite where a shape would be absorbed at any amplitude; effects that are absorbed in every shape are left out."""
     sizes: dict[str, list[float]] = {}
     effects = {column.effect.slug: column.effect for column in posterior.columns}
     for column, amplitude in zip(posterior.columns, amplitudes_of(posterior).tolist(), strict=True):
@@ -68,7 +68,7 @@ def visible_of(posterior: Posterior) -> tuple[Visible, ...]:
 
 
 def unseen_of(posterior: Posterior, visible: Sequence[Visible], raw: Sequence[RawEvidence]) -> tuple[str, ...]:
-    """The effects of the catalogue of which these data show nothing at any size; an oil temperature that nobody measured
+    """Slugs of the catalogue's effects that these data cannot show at any size; an oil temperature that nobody measured
     competes without a shape."""
     shaped = {column.effect.slug for column in posterior.columns}
     shapeless = {slug for alternative in posterior.weights for slug in alternative.causes} - shaped
@@ -77,7 +77,8 @@ def unseen_of(posterior: Posterior, visible: Sequence[Visible], raw: Sequence[Ra
 
 
 def amplitudes_of(posterior: Posterior) -> FloatArray:
-    """The formula above for each column [m], in SI units."""
+    """Detectable amplitude [m] of each column by the formula above, in SI units; infinite where it would be
+    absorbed."""
     columns, projections = posterior.columns, posterior.null.evidence.screened
     best = max(projected.evidence for projected in projections)
     sd = np.array([column.effect.prior_sd for column in columns])
@@ -100,7 +101,8 @@ _TIMES_VISIBLE = 2.0
 
 
 def isolability_of(campaign: Campaign, posterior: Posterior) -> Isolability:
-    """Of the catalogue, which could be told from which."""
+    """The pairs of the catalogue's effects with the probability that this design tells them apart, and the effects it
+    cannot show."""
     slugs = [effect.slug for effect in CATALOGUE if effect.kind is not EffectKind.VIBRATION]
     grouped = {
         slug: [(column, float(size)) for column, size in places]
@@ -138,7 +140,7 @@ def isolability_of(campaign: Campaign, posterior: Posterior) -> Isolability:
 
 
 def _with(null: PooledFit, column: Column, amplitude: float) -> PooledFit:
-    """The baseline's fit with an effect beside it."""
+    """The baseline's fit with one effect added."""
     amplitude = abs(amplitude) if column.effect.positive else amplitude
     return replace(bare(null), effects=(FittedEffect(effect=column.effect, amplitude=amplitude, shape=column.shape),))
 
@@ -146,7 +148,8 @@ def _with(null: PooledFit, column: Column, amplitude: float) -> PooledFit:
 def _pair(
     campaign: Campaign, posterior: Posterior, effects: tuple[str, str], ways: Sequence[tuple[PooledFit, PooledFit]]
 ) -> Pair:
-    """Both ways round, with the campaign and with each test beside it."""
+    """The pair of two effects: the lower probability of both ways round that they are told apart, now and with the best
+    trial."""
     after = dict[str, float]()
     distances = [CandidateDistances(posterior.problem, way) for way in ways]
     now = min(float(distinguished(distance.distances(())[0, 1])) for distance in distances)
@@ -166,7 +169,8 @@ def _pair(
 
 
 def _parting(after: Mapping[str, float], now: float) -> str:
-    """The least work that is sure to part two effects, else what helps most; empty where nothing does."""
+    """Key of the trial of least work that is sure to distinguish two effects, else of the most helpful one; empty where
+    none helps."""
     sure = [key for key, chance in after.items() if chance >= criteria.SURE]
     if sure:
         return min(sure, key=runs_of)

@@ -33,7 +33,8 @@ class Maps:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LoopTrace:
-    """A loop over one period: speed [n] rad/s, torque [n] Nm measured, and what baseline and extended model give."""
+    """A loop over one period: speed [n] rad/s, torque [n] Nm as measured, and the torque of baseline and extended
+    model."""
 
     pressure: float
     cycles: float
@@ -45,8 +46,8 @@ class LoopTrace:
 
 
 def residual_maps(baseline: Baseline, problem: FitProblem, extended: PooledFit) -> Maps | None:
-    """Means of residual over noise on plateaus (on loops where there are no plateaus) of the closed clutch, of eq. 3 taken
-    for exact and of the extended model beside the law; None without."""
+    """Maps of mean residual over noise on plateaus (on loops where there are no plateaus) of the closed clutch, by
+    eq. 3 taken for exact and by the extended model beside the law; None without such rows."""
     design, noise = problem.design, problem.noise
     rows = np.flatnonzero(design.closed & (design.rows.steady | (design.plateaus == 0)))
     if rows.size == 0:
@@ -65,7 +66,7 @@ def residual_maps(baseline: Baseline, problem: FitProblem, extended: PooledFit) 
 
 
 def _binned(values: FloatArray) -> tuple[FloatArray, IntArray]:
-    """Middles of the bins [b], and each value's bin [n]: distinct values where they are few."""
+    """Middles of the bins [b], and each value's bin [n]; few distinct values are bins themselves."""
     distinct, index = np.unique(values, return_inverse=True)
     if distinct.size <= MOST_BINS:
         return distinct, np.asarray(index, dtype=np.intp)
@@ -75,7 +76,7 @@ def _binned(values: FloatArray) -> tuple[FloatArray, IntArray]:
 
 
 def _means(values: FloatArray, row: IntArray, column: IntArray, shape: tuple[int, int]) -> FloatArray:
-    """[shape]: the mean of values [n] by row and column, NaN where there is none."""
+    """Means [rows, columns] of values [n] by row and column, NaN where there is none."""
     cell = row * shape[1] + column
     count = np.bincount(cell, minlength=shape[0] * shape[1])
     total = np.bincount(cell, weights=values, minlength=shape[0] * shape[1])
@@ -83,7 +84,8 @@ def _means(values: FloatArray, row: IntArray, column: IntArray, shape: tuple[int
 
 
 def loop_traces(baseline: Baseline, problem: FitProblem, extended: PooledFit) -> tuple[LoopTrace, ...]:
-    """A few loops, fresh to worn and low to high pressure: a period's bins, as measured and as both models have it."""
+    """Traces of a few loops, fresh to worn and low to high pressure: a period's bins, as measured and by both
+    models."""
     design = problem.design
     number = design.rows.loop
     loops = np.unique(number[design.plateaus :][design.closed[design.plateaus :]])

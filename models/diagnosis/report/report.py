@@ -29,7 +29,8 @@ from models.diagnosis.validation.held_out import Gain
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Misfit:
-    """How well a model fits: rmse and noise [Nm], the share of the variance beyond noise, and the axes of the structure."""
+    """The misfit of a model: rmse and noise [Nm], the share of the variance beyond noise, and the axes of the
+    structure."""
 
     rmse: float
     noise: float
@@ -94,7 +95,8 @@ class Pair:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Isolability:
-    """The pairs of effects that a campaign shows, hardest first, and the slugs of those that it cannot show at all."""
+    """Pairs of effects that a campaign shows, hardest to distinguish first, and the slugs of effects that it cannot
+    show at all."""
 
     pairs: tuple[Pair, ...]
     unseen: tuple[str, ...]

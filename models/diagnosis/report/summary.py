@@ -53,7 +53,7 @@ def effect_name(slug: str) -> str:
 
 
 def _with_article(slug: str) -> str:
-    """An effect of the catalogue as a sentence names it."""
+    """The name of an effect of the catalogue with its article."""
     return f"{BY_SLUG[slug].article} {effect_name(slug)}".lstrip()
 
 
@@ -71,7 +71,7 @@ def _points_of_life(count: int) -> str:
 
 
 def probability(value: float) -> str:
-    """Two digits; no certainty."""
+    """A probability with two digits, as `above 0.99` or `below 0.01` near certainty."""
     return "above 0.99" if value > 0.99 else "below 0.01" if value < 0.01 else f"{value:.2f}"
 
 
@@ -81,7 +81,7 @@ def with_unit(text: str, unit: str) -> str:
 
 
 def stated(estimate: AmplitudeEstimate, slug: str) -> str:
-    """A sentence on a size with its 90 % interval, and on its sign where that is not sure."""
+    """A sentence on the size of an effect with its 90 % interval, and on its sign where that is not sure."""
     effect, (name, _, onset) = BY_SLUG[slug], estimate.name.partition(" (from ")
     if estimate.value == 0.0:  # nothing was fitted
         return "Its size was not estimated."
@@ -105,13 +105,13 @@ def stated(estimate: AmplitudeEstimate, slug: str) -> str:
 
 
 def size_of(slug: str, value: float, unit: str) -> str:
-    """A size as a sentence gives it, with its unit."""
+    """The size of an effect with its unit, as a sentence gives it."""
     felt = BY_SLUG[slug].felt
     return with_unit(number(value), unit) if felt is None else with_unit(number(felt.of(value)), felt.unit)
 
 
 def number(value: float) -> str:
-    """Three digits, without an exponent where that is readable."""
+    """A number with three significant digits, without an exponent where that is readable."""
     if 100 <= abs(value) < 1e6:
         return _signed(f"{value:,.0f}")
     if value == 0 or 1e-6 <= abs(value) < 100:
@@ -120,7 +120,7 @@ def number(value: float) -> str:
 
 
 def _signed(text: str) -> str:
-    """With a minus that is no hyphen."""
+    """The number with a true minus sign in place of a hyphen."""
     return text.replace("-", "−")
 
 
@@ -136,7 +136,7 @@ class Sentence(NamedTuple):
 
 
 def summarise(report: Report) -> str:
-    """The paragraph."""
+    """The summary paragraph of a report."""
     say = {
         Verdict.MODEL_ADEQUATE: _adequate,
         Verdict.CAUSE_NAMED: _named,
@@ -165,7 +165,7 @@ _TELLS = {
 
 
 def _law(report: Report) -> list[Sentence]:
-    """How the friction curve differs from eq. 3, and which causes look like that."""
+    """Sentences on the friction curve's difference from eq. 3, and on causes that look like it."""
     law, sentences = report.friction_law, list[Sentence]()
     if law is not None and law.mentioned:
         low, high = (f"{end:.2g}" for end in law.interval_percent)
@@ -235,9 +235,9 @@ _ASKED_FIRST = ("torque_zero_shift", "pressure_offset")
 
 
 def _detection_limits(report: Report) -> list[Sentence]:
-    """From which size on these data would have shown an effect, in the form that shows best and in the hardest one: the
-    torque's zero and the pressure's offset first, then effects that must be largest against what is usual, those with a unit
-    before the others."""
+    """Sentences on the smallest sizes that these data would have shown, in the easiest shape of an effect and in the
+    hardest one: the torque's zero and the pressure's offset first, then effects whose limits are largest against their
+    usual size, those with a unit before the others."""
     order = sorted(report.visible, key=lambda v: (v.unit == "-", -v.least / v.usual, -v.amplitude / v.usual))
     first = [v for slug in _ASKED_FIRST for v in order if v.effect == slug]
     first = [*first, *(v for v in order if v not in first)][: criteria.VISIBLE_MENTIONED]
@@ -257,7 +257,7 @@ def _detection_limits(report: Report) -> list[Sentence]:
 
 
 def _shown(visible: Visible) -> str:
-    """The smallest size that shows, `a torque zero shift of 0.64 Nm`."""
+    """The smallest size of an effect that shows, in words: `a torque zero shift of 0.64 Nm`."""
     name, least, unit = _with_article(visible.effect), visible.least, visible.unit
     effect = BY_SLUG[visible.effect]
     if effect.felt is not None:
@@ -268,7 +268,7 @@ def _shown(visible: Visible) -> str:
 
 
 def _scatter(scatter: RunScatter | None) -> str:
-    """In brackets: the estimate, or that it is the prior's."""
+    """The run-to-run scatter in brackets, as an estimate with its interval or as assumed."""
     if scatter is None:
         return ""
     median, lower, upper = (f"{100 * share:.2g}" for share in (scatter.median, scatter.lower, scatter.upper))
@@ -306,7 +306,8 @@ def _named(report: Report) -> list[Sentence]:
 
 
 def _ambiguous(report: Report) -> list[Sentence]:
-    """The explanations among which the choice is, each with its probability, what is certain first; what to do."""
+    """Sentences of an ambiguous verdict: the causes that are certain, the alternatives with their probabilities, and
+    the next steps."""
     estimates = {candidate.effect: candidate.estimate for candidate in report.candidates}
     held = _certain(report)
     remaining = [Sentence(stated(estimates[slug], slug)) for slug in held if slug in estimates]
@@ -331,8 +332,7 @@ def _ambiguous(report: Report) -> list[Sentence]:
 
 
 def _certain(report: Report) -> tuple[str, ...]:
-    """The causes that are SURE to be at work, and of which the sign is known; none beside something unknown, which may be
-    all of it."""
+    """The causes of probability SURE whose sign is known; none beside something unknown, which may be all of it."""
     if UNCATALOGUED in report.causes:
         return ()
     shares = probabilities_by_slug(report.explanations)
@@ -345,7 +345,7 @@ def _certain(report: Report) -> tuple[str, ...]:
 
 
 def _alternative(report: Report, effects: Sequence[str], held: Sequence[str], *, brief: bool) -> str:
-    """An explanation, beside the causes that are certain: its causes, with its probability and their sizes."""
+    """An explanation in words, beside the certain causes: its further causes, with its probability and their sizes."""
     estimates = {candidate.effect: candidate.estimate for candidate in report.candidates}
     beside = [slug for slug in effects if slug not in held]
     names = [effect_name(slug) if brief and slug in BY_SLUG else _cause_name(slug) for slug in beside]
@@ -358,7 +358,8 @@ def _alternative(report: Report, effects: Sequence[str], held: Sequence[str], *,
 
 
 def _brief_size(estimate: AmplitudeEstimate, slug: str) -> str:
-    """A value with its name, without its interval, where it has a unit that one feels and its sign is known."""
+    """A value with its name and without its interval, where its unit is a familiar one and its sign is known; else
+    empty."""
     low, high = estimate.interval
     unknown = estimate.value == 0.0 or (low < 0.0 < high and not estimate.one_sided)
     if unknown or BY_SLUG[slug].felt is not None:
@@ -369,8 +370,7 @@ def _brief_size(estimate: AmplitudeEstimate, slug: str) -> str:
 
 
 def _worth_saying(report: Report) -> list[tuple[str, ...]]:
-    """The fewest explanations that are SURE to hold the truth if anything is at work, without those that are far less
-    probable than the first."""
+    """The credible set of explanations, without those far less probable than the first."""
     shares = {item.effects: item.probability for item in report.explanations}
     near = smallest(shares)
     return [effects for effects in near if shares[effects] > (1.0 - criteria.SURE) * shares[near[0]]]
@@ -380,7 +380,7 @@ _ALONE = "alone"
 
 
 def _open(report: Report, sure: Sequence[str], alternatives: Sequence[str]) -> Sentence:
-    """What is certain, and the alternatives in words."""
+    """A sentence with the certain causes and the alternatives in words."""
     if not sure:
         wrong = 1.0 - sum(item.probability for item in report.explanations if not item.effects)
         disagree = f"probably disagree with the model (probability {probability(wrong)})"
@@ -421,7 +421,7 @@ def _unexplained(report: Report) -> list[Sentence]:
 
 
 def _error(misfit: Misfit | None, axes: Sequence[str]) -> str:
-    """The baseline's error, and what it depends on."""
+    """A sentence on the baseline's error [Nm RMS] against the noise, and the axes on which it depends."""
     if misfit is None:
         return ""
     size, noise, where = number(misfit.rmse), number(misfit.noise), listed([_AXES[axis] for axis in axes])
@@ -433,7 +433,7 @@ def _error(misfit: Misfit | None, axes: Sequence[str]) -> str:
 
 
 def _adoption(report: Report) -> list[Sentence]:
-    """What adopting a named cause would do, or why it may not be adopted."""
+    """Sentences on the effect of adopting a named cause, or on the reason against it."""
     adoptable = [] if report.extension is None else [slug for slug in report.extension.effects if slug in BY_SLUG]
     if report.not_adoptable or report.gain is None or not adoptable:
         return [Sentence(report.not_adoptable)]
@@ -452,8 +452,8 @@ def _adoption(report: Report) -> list[Sentence]:
 
 
 def _next(report: Report) -> tuple[list[Sentence], list[Sentence]]:
-    """What to look at, of a named cause or where no test is, of the likeliest explanation; and the first test of the plan
-    with what it is good for."""
+    """Sentences on the checks to make, of a named cause or where no test is, of the likeliest explanation; and on the
+    first test of the plan with its benefit."""
     looked_at = [report.causes] if report.verdict is Verdict.CAUSE_NAMED else []
     best = report.advice[0] if report.advice else None
     if not looked_at and (best is None or best.narrows or best.nats < criteria.WORTHWHILE):  # no test is to decide
@@ -484,7 +484,7 @@ def _next(report: Report) -> tuple[list[Sentence], list[Sentence]]:
 
 
 def _test(advice: Advice) -> str:
-    """An advised test, in few words where it has many, with its time on the rig."""
+    """An advised test in words, few where it has many, with its time on the rig."""
     trial = TRIALS.get(advice.key)
     brief = "" if trial is None else trial.brief
     hours = advice.minutes / 60.0

@@ -59,7 +59,7 @@ def smooth_fit(problem: FitProblem, baseline: PooledFit, axes: Sequence[str]) ->
 
 
 def _along(design: Design, axis: str) -> list[Effect]:
-    """One effect a function: cosines over the axis's range, or a loop's harmonics."""
+    """Smooth effects along an axis, one for each function: cosines over the axis's range, or a loop's harmonics."""
     if axis == PHASE and design.loops:
         waves: tuple[Callable[[FloatArray], FloatArray], ...] = (np.cos, np.sin)
         orders = product(range(1, 5 + 1), waves)
@@ -86,7 +86,7 @@ def _harmonic(points: Points, k: int, wave: Callable[[FloatArray], FloatArray]) 
 
 
 def _effect(k: int, column: Callable[[Points], FloatArray], *, before_lag: bool) -> Effect:
-    """A smooth share of the torque; it is neither taken off measurements nor followed along a life."""
+    """A smooth effect in proportion to the torque; it is neither taken off measurements nor followed along a life."""
     return Effect(
         slug=SLUG,
         title="Structure without a name",
@@ -101,7 +101,7 @@ def _effect(k: int, column: Callable[[Points], FloatArray], *, before_lag: bool)
 
 
 def _size(problem: FitProblem, baseline: PooledFit, effects: Sequence[Effect]) -> float:
-    """τ of the largest marginal likelihood, in units of the prior's deviations."""
+    """Size τ of largest marginal likelihood, in units of the prior's deviations."""
     unit_changes = [(effect.change(baseline.prediction.scene, 1.0, ()), effect.lags(())) for effect in effects]
     gram = gram_of(problem, baseline, change_columns(problem.design, baseline.prediction, unit_changes))
     projected = project(gram, problem.noise.run_gain, problem.noise.curve_gain, problem.noise.law)

@@ -31,7 +31,7 @@ BoolArray = NDArray[np.bool_]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Hardest:
-    """Where the extended model's error on held-out rows is largest."""
+    """The state or pressure at which the extended model's error on held-out rows is largest."""
 
     axis: str  # cycles, or pressure
     value: float  # there, pressure in Pa
@@ -41,7 +41,8 @@ class Hardest:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Gain:
-    """What the extension gains on runs held out by state and by pressure; rmse [Nm], log score [nats]."""
+    """Gain of the extended model over the baseline on runs held out by state and by pressure; rmse [Nm], log score
+    [nats]."""
 
     held_out_runs: tuple[str, ...]
     rmse_before: float
@@ -59,7 +60,7 @@ class Gain:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Held:
-    """Rows [h] that were held out once, the error of either model there [h] Nm, and the log score gained."""
+    """Held-out rows [h] of one fold, the errors of both models there [h] Nm, and the gain of log score [nats]."""
 
     rows: NDArray[np.intp]
     before: FloatArray
@@ -69,7 +70,7 @@ class _Held:
 
 @dataclass(frozen=True, slots=True)
 class FittedModel:
-    """A model that was fitted, and its problem: the law's discrepancy is part of it."""
+    """A fit with its problem, of which the law's discrepancy is part."""
 
     problem: FitProblem
     fit: PooledFit
@@ -111,7 +112,7 @@ def measure_gain(before: FittedModel, after: FittedModel, rng: np.random.Generat
 
 
 def _groups(design: Design, fold: _Held) -> list[Hardest]:
-    """The error after by the states, or the pressures, that a fold left out."""
+    """RMS errors [Nm] of the extended model at each state, or pressure, that a fold left out."""
     groups = []
     out = np.zeros(design.torque.size, dtype=np.bool_)
     out[fold.rows] = True
@@ -148,12 +149,13 @@ def _ahead(design: Design) -> BoolArray | None:
 
 
 def _without(noise: Noise, out: BoolArray) -> Noise:
-    """The noise when those rows are left out."""
+    """The noise with so large a deviation on the rows `out` that they have no weight."""
     return replace(noise, deviation=np.where(out, 1e6, 1.0) * noise.deviation)  # as good as not there
 
 
 def _forecast_score(model: FittedModel, out: BoolArray) -> float:
-    """The log score [nats] of rows that are held out, the uncertainty of what was fitted to the others included."""
+    """Log predictive score [nats] of held-out rows, with the uncertainty of the parameters fitted to the others
+    included."""
     problem = model.problem
     noise = replace(problem.noise, law=EXACT)  # the law's coefficients are fitted beside the parameters
     before = problem.with_noise(_without(problem.noise, out))
@@ -191,7 +193,8 @@ def _held(before: FittedModel, after: FittedModel, out: BoolArray) -> _Held:
 
 
 def _bridged(laws: Laws, design: Design, out: BoolArray) -> Laws:
-    """With C at pressures whose loops were all held out taken from the pressures beside them (log C linear between)."""
+    """The laws with C, at pressures whose loops were all held out, interpolated from neighbouring pressures (log C
+    linear between)."""
     nodes = laws.frame.loop_pressures
     looping = ~design.rows.steady
     is_known = np.isin(nodes, np.unique(design.level[looping & ~out]))
@@ -205,7 +208,8 @@ def _bridged(laws: Laws, design: Design, out: BoolArray) -> Laws:
 def _reduction(
     curve: NDArray[np.intp], before: FloatArray, after: FloatArray, rng: np.random.Generator
 ) -> tuple[float, float]:
-    """By how much the RMSE falls [%], and its deviation: whole curves are drawn again, both models on the same ones."""
+    """Reduction of the RMSE [%] and its bootstrap standard deviation: whole curves are resampled, both models on the
+    same ones."""
     _, index = np.unique(curve, return_inverse=True)
     sums = np.stack([np.bincount(index, weights=errors**2) for errors in (before, after)])
     drawn = rng.integers(sums.shape[1], size=(400, sums.shape[1]))

@@ -36,7 +36,8 @@ BLEND = 0.15
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GridState:
-    """All measurements: the posterior is computed again over the whole history, so nothing else is carried on."""
+    """The state of the grid filter, all measurements: the posterior is computed again over the whole history, so
+    nothing else is carried on."""
 
     prior: TrackPrior
     history: History
@@ -53,8 +54,9 @@ class GridState:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Laid:
-    """The kinds of history that count, the grid's frame, and the posterior's mass [kinds, levels, rows, nodes] on it,
-    summing to one. `log_evidence` is the log probability of everything measured, up to a constant of the prior."""
+    """The posterior on its grid: the kinds of history of non-negligible mass, the grid's frame, and the posterior's
+    mass [kinds, levels, rows, nodes] on it, summing to one. `log_evidence` is the log probability of everything
+    measured, up to a constant of the prior."""
 
     kinds: Kinds
     frame: LatticeFrame
@@ -64,7 +66,7 @@ class Laid:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Grid:
-    """The filter: `nodes` of log τ on each of `rows` of log ε, at `levels` of log s; each at least 2.
+    """The exact filter on a grid: `nodes` of log τ on each of `rows` of log ε, at `levels` of log s; each at least 2.
 
     An update only stores the measurement: the discrepancy is expressed in shares of the progress measured so far, so that
     all sums over the history change with every test. The grid is computed when draws are requested.
@@ -76,26 +78,26 @@ class Grid:
     levels: int = 11
 
     def start(self, prior: TrackPrior) -> GridState:
-        """Nothing measured."""
+        """The state without measurements."""
         return self.from_history(prior, ())
 
     def update(self, state: GridState, measurement: Measurement, rng: np.random.Generator | None = None) -> GridState:  # noqa: ARG002
-        """One more measurement; exact, so `rng` is not used."""
+        """The state after one more measurement; exact, so `rng` is not used."""
         return GridState(prior=state.prior, history=state.history.append(measurement, state.prior))
 
     @staticmethod
     def from_history(prior: TrackPrior, measurements: Sequence[Measurement]) -> GridState:
-        """All measurements at once: the same as `update` with one after another, bit for bit."""
+        """The state after all measurements at once: the same as `update` with one after another, bit for bit."""
         return GridState(prior=prior, history=History.of(measurements, prior))
 
     @staticmethod
     def from_merged(prior: TrackPrior, measurements: Sequence[Measurement]) -> GridState:
-        """All measurements at once, the older ones of a long history merged: nearly the same posterior at a cost that does
-        not grow with their number (`tracking.merged_tests`)."""
+        """The state after all measurements at once, the older ones of a long history merged: nearly the same posterior
+        at a cost that does not grow with their number (`tracking.merged_tests`)."""
         return GridState(prior=prior, history=merged(History.of(measurements, prior), prior))
 
     def laid(self, state: GridState) -> Laid:
-        """The posterior of everything measured."""
+        """The posterior of all measurements on its grid."""
         prior, history = state.prior, state.history
         kinds, frame = completed(prior, history, *lattice.closed_in(prior, history))
         frame = frame.resized(self.rows, self.levels)
@@ -111,7 +113,7 @@ class Grid:
         return self.drawn(state, self.laid(state), size, rng)
 
     def drawn(self, state: GridState, laid: Laid, size: int, rng: np.random.Generator) -> TrackPosterior:
-        """Draws from a posterior that is laid already."""
+        """Draws from a posterior that has been computed on its grid."""
         prior, history = state.prior, state.history
         offset = rng.random(7)
         count = size * min(max(MANY // max(history.progress.size, 1), 1), OVERSAMPLING)
@@ -139,7 +141,7 @@ class Grid:
 
 
 def _blended(mass: FloatArray) -> FloatArray:
-    """How often to draw from each cell: its mass blended with its neighbours', [kinds, levels, rows, nodes].
+    """Sampling probability of each cell: its mass blended with its neighbours', [kinds, levels, rows, nodes].
 
     A ridge narrower than a cell may run past the nodes of a row; such a cell has too little mass for what it holds, and
     one draw out of it would outweigh hundreds of others.
@@ -157,8 +159,8 @@ def _blended(mass: FloatArray) -> FloatArray:
 def _placed(
     laid: Laid, cell: tuple[NDArray[np.intp], ...], uniform: FloatArray, span: float
 ) -> tuple[EvaluationPoints, FloatArray]:
-    """Points placed within their cells by uniform numbers [n, 3], and the volume of (log φ, log ε, log s) that each stands
-    for [n]."""
+    """Points placed within their cells by uniform numbers [n, 3], and the volume of (log φ, log ε, log s) that each
+    represents [n]."""
     frame, (kind, level, row, node) = laid.frame, cell
     log_scatter = _within(frame.log_scatter, kind, level, uniform[:, 0])
     log_exponent = _within(frame.log_exponent, kind, row, uniform[:, 1])
@@ -179,5 +181,5 @@ def _placed(
 
 
 def _within(axis: FloatArray, kind: NDArray[np.intp], index: NDArray[np.intp], place: FloatArray) -> FloatArray:
-    """A place in [0, 1) within the cell around each node of an equidistant axis [k, nodes]."""
+    """Coordinates at relative positions in [0, 1) within the cells around nodes of an equidistant axis [k, nodes]."""
     return np.asarray(axis[kind, index] + (place - 0.5) * (axis[kind, 1] - axis[kind, 0]))

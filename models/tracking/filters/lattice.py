@@ -53,7 +53,8 @@ LAID_FIRST = np.unique(_STANDS_FOR)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Kinds:
-    """k kinds of history: their form [k], which runs are outlying [k, t] (0, 1), log prior probability [k]."""
+    """The k kinds of history on lattices: their form [k], whether each run is outlying [k, t] (0, 1), log prior
+    probability [k]."""
 
     form: NDArray[np.intp]
     outlying: FloatArray
@@ -61,7 +62,7 @@ class Kinds:
 
     @classmethod
     def of(cls, prior: TrackPrior, outlying: FloatArray, forms: NDArray[np.intp]) -> "Kinds":
-        """Every form that the prior allows, with every set [c, t]."""
+        """All combinations of the `forms` that the prior allows with the sets of outlying runs [c, t]."""
         weight = log_form_weight(prior)
         possible = forms[np.isfinite(weight[forms])]
         sets = np.repeat(outlying, possible.size, axis=0)
@@ -87,7 +88,7 @@ class Kinds:
 
 
 def represented(prior: TrackPrior, laid: Kinds) -> tuple[Kinds, NDArray[np.intp]]:
-    """All kinds, and which of those `laid` stands for each."""
+    """All kinds, and for each the index of the kind of `laid` that represents it on the first lattice."""
     weight = log_form_weight(prior)
     groups = [np.flatnonzero((form == _STANDS_FOR) & np.isfinite(weight)) for form in laid.form.tolist()]
     index, form = np.repeat(np.arange(laid.form.size), [forms.size for forms in groups]), np.concatenate(groups)
@@ -97,7 +98,7 @@ def represented(prior: TrackPrior, laid: Kinds) -> tuple[Kinds, NDArray[np.intp]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LatticeFrame:
-    """Where a lattice lies, for each kind: rows of log ε [k, r] and levels of log s [k, l], equidistant, and each row's
+    """The extent of each kind's lattice: rows of log ε [k, r] and levels of log s [k, l], equidistant, and each row's
     interval of log τ, [k, r]."""
 
     log_exponent: FloatArray
@@ -106,7 +107,8 @@ class LatticeFrame:
     upper: FloatArray
 
     def resized(self, rows: int, levels: int) -> "LatticeFrame":
-        """The regions with other numbers of rows and levels; intervals are interpolated between rows."""
+        """The frame with other numbers of rows and levels over the same regions; intervals are interpolated between
+        rows."""
         log_exponent = _spaced(self.log_exponent[:, 0], self.log_exponent[:, -1], rows)
         return LatticeFrame(
             log_exponent=log_exponent,
@@ -129,17 +131,17 @@ class LatticeFrame:
         return _spaced(self.lower, self.upper, nodes)
 
     def cells(self, nodes: int) -> FloatArray:
-        """The volume of a cell, [k, rows]."""
+        """Volume of a lattice cell, [k, rows]."""
         steps = np.ptp(self.log_exponent, axis=1) * np.ptp(self.log_scatter, axis=1)
         return np.asarray((self.upper - self.lower) * steps[:, None] / (nodes - 1))
 
     def taken(self, index: NDArray[np.intp]) -> "LatticeFrame":
-        """The lattices of the kinds at `index`."""
+        """The frames of the kinds at `index`."""
         return LatticeFrame(**{field.name: getattr(self, field.name)[index] for field in fields(self)})
 
 
 def whole(prior: TrackPrior) -> LatticeFrame:
-    """The prior's own range, for a single kind."""
+    """The frame over the prior's whole range, for a single kind."""
     _, rows, levels = COARSE
     log_exponent = prior.log_exponent_mean + np.linspace(-REACH, REACH, rows) * prior.log_exponent_sd
     low = prior.log_scale_mean - REACH * prior.log_scale_sd
@@ -154,7 +156,7 @@ def whole(prior: TrackPrior) -> LatticeFrame:
 
 
 def tabled(frame: LatticeFrame, nodes: int, history: History, course: NDArray[np.intp]) -> FloatArray:
-    """b of courses [k] at every measurement on the cells of all rows, [k, t, rows · nodes]; one frame serves all."""
+    """Basis b [k, t, rows · nodes] of courses [k] at every measurement on all nodes; one frame serves all."""
     log_exponent, by_kind = frame.log_exponent[:, None, :, None], course[:, None, None, None]
     log_scale, _ = log_scale_at(frame.log_rate(nodes)[:, None] + log_exponent, by_kind, history.span)
     table = basis(history.progress[:, None, None], log_scale, log_exponent, by_kind)
@@ -186,8 +188,8 @@ def log_density(
 
 
 def closed_in(prior: TrackPrior, history: History) -> tuple[Kinds, LatticeFrame, FloatArray]:
-    """The kinds and regions that hold the posterior's mass, by coarse lattices laid over what the last one left; and the
-    log mass of each kind [k] on the last of these."""
+    """The kinds with non-negligible posterior mass, the lattice frames that cover it, found by repeatedly shrinking
+    coarse lattices, and the log mass of each kind [k] on the last of these."""
     first = whole(prior)
     if history.value.size == 0:
         kinds = Kinds.of(prior, np.zeros((1, 0)), np.arange(FORM_SIZE.size))
@@ -226,8 +228,8 @@ def closed_in(prior: TrackPrior, history: History) -> tuple[Kinds, LatticeFrame,
 def _closer(
     prior: TrackPrior, history: History, kinds: Kinds, frame: LatticeFrame, share: FloatArray
 ) -> tuple[LatticeFrame, FloatArray, FloatArray]:
-    """The frame of what a coarse lattice over a frame holds, its log mass [k], and how much it was blurred [k]: by a `share`
-    [k] for each e-fold of τ."""
+    """The frame shrunk to the mass on a coarse lattice over `frame`, the log mass of each kind [k], and the blur used
+    [k], in the quantity's unit: `share` [k] for each e-fold of τ between nodes."""
     nodes = COARSE[0]
     blurs = share * (frame.upper - frame.lower).max(axis=1) / (nodes - 1)
     density = log_density(prior, history, kinds, frame, tabled(frame, nodes, history, kinds.course), blurs)
@@ -237,7 +239,7 @@ def _closer(
 def _first(
     prior: TrackPrior, history: History, frame: LatticeFrame, table: FloatArray, blur: float
 ) -> tuple[Kinds, FloatArray]:
-    """The kinds, once it is known which runs may be outlying, and their density on the first coarse lattice."""
+    """The kinds, with likely sets of outlying runs found by search, and their density on the first coarse lattice."""
     search, densities = OutlierSearch.begun(prior, history), {}
 
     def looked_at(outlying: FloatArray) -> FloatArray:
@@ -257,7 +259,7 @@ def _first(
 def _chosen(
     prior: TrackPrior, history: History, frame: LatticeFrame, table: FloatArray, log_mass: FloatArray, blur: float
 ) -> tuple[Nodes, Nodes]:
-    """NODES nodes of each level of s, drawn evenly by a power of their mass; and the best one of each level."""
+    """NODES nodes of each level of s by tempered systematic sampling, and the best node of each level."""
     _, levels, rows, nodes = log_mass.shape
     by_level = np.moveaxis(log_mass, 1, 0).reshape(levels, -1)
 
@@ -278,7 +280,7 @@ def _chosen(
 
 
 def log_masses(density: FloatArray, cells: FloatArray) -> FloatArray:
-    """The logarithm of the mass of each kind [k] on cells of volume [k, rows] or [1, rows]."""
+    """Log mass of each kind [k], from densities on cells of volume [k, rows] or [1, rows]."""
     top = density.max(axis=(1, 2, 3))
     off = np.exp(density - top[:, None, None, None]).sum(axis=(1, 3))
     return np.asarray(top + np.log((off * cells).sum(axis=1)))
@@ -288,7 +290,7 @@ Part = TypeVar("Part", Kinds, LatticeFrame)
 
 
 def joined(first: Part, second: Part) -> Part:
-    """The kinds of both, or their lattices, one after the other."""
+    """The kinds of both, or their frames, concatenated."""
     columns = {
         field.name: np.concatenate([getattr(part, field.name) for part in (first, second)]) for field in fields(first)
     }
@@ -296,7 +298,8 @@ def joined(first: Part, second: Part) -> Part:
 
 
 def shrunk(frame: LatticeFrame, density: FloatArray) -> LatticeFrame:
-    """The rows, levels and intervals that hold mass, with a node to spare on either side; as many as before."""
+    """The frame shrunk to the rows, levels and intervals that hold mass, with one node to spare on either side and the
+    same numbers of rows and levels."""
     nodes = density.shape[3]
     by_row = density.max(axis=1)
     first, last = _held(by_row)
@@ -317,7 +320,7 @@ def shrunk(frame: LatticeFrame, density: FloatArray) -> LatticeFrame:
 
 
 def _held(density: FloatArray) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """The first and last index along the last axis that hold mass, with one to spare."""
+    """First and last index along the last axis with non-negligible density, with one node to spare on either side."""
     is_likely = density > density.max(axis=-1, keepdims=True) - DEPTH
     last = density.shape[-1] - 1
     return np.maximum(is_likely.argmax(axis=-1) - 1, 0), np.minimum(
@@ -326,7 +329,7 @@ def _held(density: FloatArray) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
 
 
 def _shrinkage(wide: LatticeFrame, closer: LatticeFrame) -> FloatArray:
-    """The share of the widest interval, of the rows or of the levels that is left, whichever is smallest; [k]."""
+    """Ratio [k] of new to old width of the widest interval, of the rows or of the levels, whichever shrank most."""
     interval = (closer.upper - closer.lower).max(axis=1) / (wide.upper - wide.lower).max(axis=1)
     rows = np.ptp(closer.log_exponent, axis=1) / np.ptp(wide.log_exponent, axis=1)
     levels = np.ptp(closer.log_scatter, axis=1) / np.ptp(wide.log_scatter, axis=1)
@@ -341,7 +344,8 @@ def _spaced(low: FloatArray, high: FloatArray, count: int) -> FloatArray:
 def completed(
     prior: TrackPrior, history: History, kinds: Kinds, frame: LatticeFrame, log_mass: FloatArray
 ) -> tuple[Kinds, LatticeFrame]:
-    """The kinds and their lattices, with those of the sets that were overlooked; `log_mass` [k] says which kinds lead."""
+    """The kinds and their frames, completed by overlooked sets of outlying runs: neighbours, by one run, of the three
+    kinds of largest `log_mass` [k]."""
     if prior.outlying_share == 0.0 or history.value.size < 2:
         return kinds, frame
     leaders = np.argsort(-log_mass, kind="stable")[:3]  # the three that lead
@@ -374,7 +378,7 @@ def completed(
 def _nodes(
     kinds: Kinds, frame: LatticeFrame, table: FloatArray, mass: FloatArray, kind: int, relative: FloatArray
 ) -> Nodes:
-    """32 nodes of one kind, drawn evenly by a power of their mass."""
+    """32 nodes of one kind by tempered systematic sampling of their mass."""
     drawn, log_share = _tempered(mass[kind].reshape(1, -1), 32)
     level, cell = np.divmod(drawn[0], mass.shape[2] * mass.shape[3])
     return Nodes(
@@ -386,8 +390,8 @@ def _nodes(
 
 
 def _tempered(log_mass: FloatArray, count: int) -> tuple[NDArray[np.intp], FloatArray]:
-    """`count` nodes of each row [r, n], drawn evenly by a power of their mass so that what an outlying run hides is among
-    them; and the logarithm of how often each is drawn; [r, count]."""
+    """Systematic draws [r, count] of nodes from mass^TEMPER in each row [r, n], and the log of each drawn node's
+    expected number of draws [r, count]; the flattening keeps nodes that an outlying run makes look improbable."""
     chance = np.exp(TEMPER * (log_mass - log_mass.max(axis=1, keepdims=True)))
     edges = np.cumsum(chance, axis=1)
     places = (np.arange(count) + 0.5) / count

@@ -45,8 +45,8 @@ from models.tracking.sampling import normalised, spread_normals, spread_points, 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Cloud:
-    """n particles: points [n, 3] of (log |φ|, log |ε|, log s), form [n] (`courses`), outlying [n, t], log_weight [n]
-    and log_target [n] (log prior plus evidence)."""
+    """A cloud of n particles: points [n, 3] of (log |φ|, log |ε|, log s), form [n] (`courses`), outlying [n, t],
+    log_weight [n] and log_target [n] (log prior plus evidence)."""
 
     points: FloatArray
     form: FloatArray
@@ -65,7 +65,7 @@ class Cloud:
         return FORM_COURSE[self.form.astype(np.intp)]
 
     def placed(self) -> EvaluationPoints:
-        """The particles as points of the closed form."""
+        """The particles as evaluation points of the closed form."""
         return EvaluationPoints(
             log_scale=self.points[:, 0],
             log_exponent=self.points[:, 1],
@@ -78,9 +78,9 @@ class Cloud:
 def entered(
     prior: TrackPrior, history: History, cloud: Cloud, rng: np.random.Generator
 ) -> tuple[Cloud, tuple[Sums, Terms] | None]:
-    """The particles of all runs of a history but its last, weighted by that one, each with a flag for it drawn from its
-    posterior given the rest of the particle; and of a long history, where it is dear and the same whichever points it is
-    taken at together, the closed form at each."""
+    """The particles reweighted by the last run of a history, each with an outlier flag for that run drawn from its
+    posterior given the rest of the particle. For a long history also the closed form at each particle, which is
+    expensive and does not depend on the batch of points; else None."""
     as_sound = replace(cloud, outlying=np.column_stack([cloud.outlying, np.zeros(cloud.form.size, bool)]))
     points = as_sound.placed()
     sums, terms = pointwise(history, prior, points)
@@ -118,7 +118,7 @@ def _log_prior(prior: TrackPrior, cloud: Cloud) -> FloatArray:
 
 
 def _log_alive(history: History, cloud: Cloud) -> FloatArray:
-    """Of every particle whose course ended before the last measurement that it was never taken."""
+    """Log probability [n] that no particle's course ended before the last measurement: -1e6 where it did, else 0."""
     ended = (SCALE_SIGN[cloud.course] < 0.0) & (cloud.points[:, 0] <= math.log(history.span))
     return np.where(ended, -1e6, 0.0)
 
@@ -137,8 +137,8 @@ _GRID = Grid()
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ParticleState:
-    """Everything measured and the particles that stand for it; `solved` is the closed form at them where it was just
-    found, and is not stored."""
+    """The state of the particle filter: all measurements and the particles; `solved` is the closed form at them where
+    it was just computed, and is not stored."""
 
     prior: TrackPrior
     history: History
@@ -166,8 +166,8 @@ def _flags(arrays: dict[str, Any]) -> dict[str, NDArray[np.bool_]]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Particle:
-    """The filter. Steps of a move end after `moves`, or when a share `moved` of the particles has moved; without any it is
-    a plain resampling filter, which starves: it serves for comparison.
+    """The particle filter. Steps of a move end after `moves`, or when a share `moved` of the particles has moved;
+    without any it is a plain resampling filter, which starves: it serves for comparison.
 
     Chosen: on 60 lives, and on 60 with an outlying run in ten, shares of 0.9, 0.8 and 0.7 have a CRPS of the end's logarithm
     of 1.03, 0.97 and 0.98, and 0.93, 0.92 and 0.90 times the exact filter's, and take 15, 12 and 10 ms a test.
@@ -179,7 +179,7 @@ class Particle:
     moved: float = 0.7
 
     def start(self, prior: TrackPrior) -> ParticleState:
-        """Particles spread evenly over the prior, the same every time."""
+        """The state with particles spread evenly over the prior, the same every time."""
         centre = np.array([prior.log_scale_mean, prior.log_exponent_mean, prior.log_scatter_mean])
         spread = np.array([prior.log_scale_sd, prior.log_exponent_sd, prior.log_scatter_sd])
         even = spread_points(self.particles, np.full(4, 0.5))
@@ -196,7 +196,7 @@ class Particle:
         return ParticleState(prior=prior, history=nothing, cloud=replace(cloud, log_target=target))
 
     def update(self, state: ParticleState, measurement: Measurement, rng: np.random.Generator) -> ParticleState:
-        """The posterior with one more measurement."""
+        """The state after one more measurement."""
         prior, history = state.prior, state.history.append(measurement, state.prior)
         cloud, solved = entered(prior, history, state.cloud, rng)
         weight = normalised(cloud.log_weight)
@@ -222,7 +222,7 @@ class Particle:
         return replace(cloud, log_target=log_target_of(history, prior, cloud))
 
     def _renewed(self, prior: TrackPrior, history: History, cloud: Cloud, rng: np.random.Generator) -> Cloud:
-        """Resampled, and moved by steps of a random walk shaped like the cloud."""
+        """The particles resampled, then moved by a Metropolis random walk shaped like the cloud."""
         weight, span = normalised(cloud.log_weight), history.span
         shapes = _shapes(cloud, weight, span)
         chance, log_weight = _kept(cloud.course, weight)
@@ -256,12 +256,12 @@ class Particle:
 
 
 def _places(cloud: Cloud, span: float) -> FloatArray:
-    """The points with log(|φ| - span) in place of log |φ| where a course ends [n, 3]."""
+    """Lattice coordinates [n, 3] of the points, with log(|φ| - span) in place of log |φ| where a course ends."""
     return np.column_stack([place_of(cloud.points[:, 0], cloud.course, span), cloud.points[:, 1:]])
 
 
 def _shapes(cloud: Cloud, weight: FloatArray, span: float) -> FloatArray:
-    """A square root of the covariance of the places of each course's particles [6, 3, 3]."""
+    """Square roots [6, 3, 3] of the covariances of each course's particles in lattice coordinates."""
     shapes, places = np.zeros((len(CourseForm), 3, 3)), _places(cloud, span)
     for course in np.unique(cloud.course):
         in_course = cloud.course == course
@@ -272,8 +272,8 @@ def _shapes(cloud: Cloud, weight: FloatArray, span: float) -> FloatArray:
 
 
 def _kept(course: NDArray[np.intp], weight: FloatArray, least: float = 0.05) -> tuple[FloatArray, FloatArray]:
-    """How often to take each particle, so that every course keeps at `least` a share, and the log weight that makes up for
-    it [n]: what the data do not speak for today they may speak for later."""
+    """Resampling weights [n] under which every course keeps at least the share `least`, and the compensating log
+    weights [n]: a course that the data do not favour today they may favour later."""
     share = np.bincount(course, weights=weight, minlength=len(CourseForm))
     alive = share > 1e-100  # what makes up for it must not overflow
     shares = np.where(alive, np.maximum(share, least), share)
@@ -283,8 +283,8 @@ def _kept(course: NDArray[np.intp], weight: FloatArray, least: float = 0.05) -> 
 
 
 def _proposed(cloud: Cloud, shapes: FloatArray, span: float, rng: np.random.Generator) -> tuple[Cloud, FloatArray]:
-    """A step of every particle, as likely as the step back but for a log factor [n]: always in its points; at times another
-    size is tried, and the flag of one run, or the law of the scatter, turned."""
+    """A Metropolis proposal for every particle, and the log [n] of its Hastings factor: a step in its points always,
+    and at times another size q, a turned flag of one run, or the other law of the scatter."""
     resized, turning = 0.25, 0.1
     (count, runs), course = cloud.outlying.shape, cloud.course
     stride = rng.uniform(0.2, 1.6, size=(count, 1))

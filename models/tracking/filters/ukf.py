@@ -77,19 +77,19 @@ class Normals:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class UkfState:
-    """The particles, and the normals that the newest test has been taken into, which no later step is made from."""
+    """State of the filter: the particles, and the normals after the newest test, from which no later step starts."""
 
     particles: ParticleState
     normals: Normals
 
     @property
     def prior(self) -> TrackPrior:
-        """What the particles started from."""
+        """The prior of the particles."""
         return self.particles.prior
 
     @property
     def history(self) -> History:
-        """Everything measured."""
+        """All measurements."""
         return self.particles.history
 
     def to_arrays(self) -> dict[str, FloatArray | NDArray[np.bool_]]:
@@ -107,18 +107,18 @@ class UkfState:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ukf:
-    """The filter: that of the particles, and at every test `moments` draws of them whose moments filterpy starts from."""
+    """The filter: the particle filter, and at every test filterpy's step from the moments of `moments` of its draws."""
 
     name: ClassVar[str] = "ukf"
     particle: Particle = field(default_factory=Particle)
     moments: int = 2_000
 
     def start(self, prior: TrackPrior) -> UkfState:
-        """Nothing measured."""
+        """The state before any measurement."""
         return UkfState(particles=self.particle.start(prior), normals=Normals.none())
 
     def update(self, state: UkfState, measurement: Measurement, rng: np.random.Generator) -> UkfState:
-        """The particles with one more measurement, and the normals that it was taken into."""
+        """The state with one more measurement: particles, and the normals updated by it."""
         before, prior = state.history, state.prior
         particles = self.particle.update(state.particles, measurement, rng)
         in_order = measurement.progress >= before.span and measurement.epoch >= before.epoch.max(initial=0.0)
@@ -128,7 +128,7 @@ class Ukf:
         return UkfState(particles=particles, normals=stepped(draws, particles.history, prior))
 
     def passed(self, state: UkfState, measurement: Measurement, rng: np.random.Generator) -> UkfState:
-        """The particles with a measurement after which nothing is asked: no normals are made."""
+        """The state with one more measurement, without normals, because no answer is asked for after it."""
         return UkfState(particles=self.particle.update(state.particles, measurement, rng), normals=Normals.none())
 
     def posterior(self, state: UkfState, size: int, rng: np.random.Generator) -> TrackPosterior:
