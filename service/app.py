@@ -39,10 +39,8 @@ uncertainty, how many duty cycles remain until the mean coefficient of friction 
 
 
 def _kinds(database: Database, workers: Workers) -> Sequence[Mapping[str, JobKind]]:
-    """How jobs are done, by their kind, and their ends stored: what somebody wants adopted is tracked again by the workers.
-
-    Of each group one is done at a time: a diagnosis does not wait until a thousand clutches are replayed.
-    """
+    """The kinds of jobs and how they are done, in groups; each group runs one job at a time, so that a diagnosis need
+    not wait for a replay of a thousand clutches. The workers adopt models."""
 
     def adopt(job: JobRow, ended: Mapping[str, Any]) -> bool:
         function = partial(adopt_model.finish_and_adopt, claimer=job.claimed_by or "")
@@ -68,7 +66,7 @@ def _kinds(database: Database, workers: Workers) -> Sequence[Mapping[str, JobKin
 
 
 def create_app(settings: Settings) -> FastAPI:
-    """The service on one database, which is opened (and migrated) when it starts and closed when it stops.
+    """The application on one database, which is opened (and migrated) when it starts and closed when it stops.
 
     Starting raises ServiceRuns where another service uses the file; a database on a server is any number's.
     """

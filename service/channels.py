@@ -26,7 +26,7 @@ ZERO_CELSIUS = 273.15
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Channel:
-    """A channel at the edge: SI value = factor · value + offset; values outside [least, most] are refused."""
+    """A channel with its public unit: SI value = factor · value + offset; values outside [least, most] are refused."""
 
     name: str
     unit: str
@@ -36,7 +36,7 @@ class Channel:
     most: float
 
     def to_si(self, values: FloatArray) -> FloatArray:
-        """Values [n] in the channel's unit to SI [n]; the same array where that is the unit."""
+        """Values [n] converted from the channel's unit to SI [n]; the same array if the units are equal."""
         if self.factor == 1.0 and self.offset == 0.0:
             return values
         converted = values * self.factor
@@ -69,12 +69,12 @@ SAMPLED_LEAST = {"pressure_bar": -1.1, "speed_rpm": -1e6}
 
 
 def whole(value: float) -> float | int:
-    """A float as JSON's shortest number: 7000.0 leaves as 7000."""
+    """A number for JSON: an integer if it is whole, so that 7000.0 is sent as 7000."""
     return int(value) if value.is_integer() and abs(value) < 2**53 else value
 
 
 def bar(pressure: float) -> float:
-    """Pa to bar, free of the last bits' noise."""
+    """A pressure in bar, from Pa, without rounding noise in the last bits."""
     return round(pressure / PASCALS_PER_BAR, 9)
 
 
@@ -83,12 +83,12 @@ LineOf = Callable[[int], int]
 
 
 def place(name: str, row: int, line_of: LineOf | None) -> str:
-    """A value of a channel, for a message."""
+    """A value's place in a channel, for an error message."""
     return f"{name}[{row}]" + (f" (line {line_of(row)})" if line_of else "")
 
 
 class _Errors:
-    """The first MAX_ERRORS errors, and how many there are in all. Rows of a file are given with their line."""
+    """The first MAX_ERRORS errors, and the total number. Rows of a file are given with their line."""
 
     def __init__(self, kept: list[FieldError], line_of: LineOf | None) -> None:
         self.kept, self.total, self._line_of = kept, len(kept), line_of
@@ -106,7 +106,7 @@ class _Errors:
 def check_columns(
     columns: Mapping[str, Sequence[Any] | FloatArray], *, line_of: LineOf | None = None
 ) -> dict[str, FloatArray]:
-    """Columns by public channel name, as parsed or as arrays in the channels' units -> float64 [n], bit for bit.
+    """Columns checked and converted to float64 [n], by public channel name; values keep every bit.
 
     Raises InvalidError where a column is empty, lengths differ, or a value is not a finite number within its channel's
     range. The error lists at most 50 places and says how many there are in all; with `line_of` it names the lines of the
@@ -177,7 +177,7 @@ _BLOCK = 1 << 16
 
 
 def canonical(value: Any) -> Any:
-    """A value of JSON, or a datetime with a time zone, in the one notation by which it is compared."""
+    """A JSON value, or a datetime with a time zone, in one fixed notation for comparison."""
     if isinstance(value, Mapping):
         return {name: canonical(item) for name, item in value.items()}
     if isinstance(value, list | tuple):
@@ -196,7 +196,7 @@ def instant(stated: str | None) -> datetime | None:
 
 
 def content_of(record: Mapping[str, Any] | Sequence[Any]) -> str:
-    """The sha256 of a record: equal for equal values. Raises ValueError where a number is not finite."""
+    """The sha256 of a record; equal values give equal hashes. Raises ValueError if a number is not finite."""
     return _digest(record).hexdigest()
 
 

@@ -13,7 +13,7 @@ MAX_QUOTED = 80
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FieldError:
-    """One thing wrong with one place of a request: JSON pointer, 1-based row where the place is in a column, value."""
+    """One error at one place of a request: JSON pointer, value, and 1-based row if the place is in a column."""
 
     pointer: str
     code: str
@@ -24,7 +24,7 @@ class FieldError:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Notice:
-    """A warning: something that was noticed and did not stop the run; of a doubt the cycles that it asks about."""
+    """A warning that did not stop the run; a doubt has the cycles that it concerns."""
 
     code: str
     message: str
@@ -58,7 +58,7 @@ class InvalidError(ServiceError, status=422, slug="invalid-content", title="The 
     def of(
         cls, message: str, *, code: str, pointer: str = "", value: str = "", row: int | None = None
     ) -> "InvalidError":
-        """The one thing that is wrong."""
+        """An error with one wrong place."""
         error = FieldError(pointer=pointer, code=code, message=message, row=row, value=value[:MAX_QUOTED])
         return cls(message, errors=[error])
 
@@ -71,14 +71,15 @@ Found = TypeVar("Found")
 
 
 def found(row: Found | None, what: str, name: str, *, only: Collection[str] | None = None) -> Found:
-    """What was looked up by its name. Raises NotFoundError where there is none, or it is of no clutch among `only` these."""
+    """The row, if it was found and belongs to one of the clutches `only`. Raises NotFoundError where there is none, or
+    it is of no clutch among `only` these."""
     if row is None or (only is not None and getattr(row, "clutch_id", None) not in only):
         raise NotFoundError(f"there is no {what} {name[:80]!r}")
     return row
 
 
 def unknown_clutch(clutch_id: str) -> NotFoundError:
-    """What is answered of a clutch that nobody has registered."""
+    """The error for a clutch that is not registered."""
     return NotFoundError(
         f"there is no clutch {clutch_id!r}: register it with POST /v1/clutches, or clutchlife register {clutch_id}"
     )
@@ -147,7 +148,7 @@ class ForbiddenError(ServiceError, status=403, slug="forbidden", title="Not allo
 
 
 def exit_text(code: int) -> str:
-    """How a process ended, by the code of `subprocess`: the signal, or its status."""
+    """A process's end in words, by the return code of `subprocess`: its signal or exit status."""
     try:
         return signal.Signals(-code).name if code < 0 else f"status {code}"
     except ValueError:

@@ -45,8 +45,8 @@ FIT_COLUMNS = ("pressure", "undetermined", "noise", "mse_percent", "rmse", "acce
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class KeptHistory:
-    """The history of a clutch at a revision: accepted and held runs, ordered, the greatest key among all its runs, and about
-    how many bytes it takes."""
+    """A clutch's history at a revision, kept in memory: accepted and held runs in order, the greatest key of its runs,
+    and its approximate size [bytes]."""
 
     revision: int
     last_key: int
@@ -58,7 +58,7 @@ class KeptHistory:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class KeptFits:
-    """The fits of all runs of a clutch at a revision, by run_id, and the greatest key among its runs."""
+    """The fits of all runs of a clutch at a revision, by run_id, and the greatest key of its runs."""
 
     revision: int
     last_key: int
@@ -66,7 +66,7 @@ class KeptFits:
 
 
 def history(connection: Connection, row: ClutchRow) -> KeptHistory:
-    """The history of a clutch at the revision of its row, which was read by the same transaction."""
+    """The clutch's history at the revision of `row`, which the same transaction has read."""
     kept = kept_of(connection)
     if kept is None:  # what a transaction that writes has changed may be rolled back
         return _read(connection, row)
@@ -82,7 +82,7 @@ def history(connection: Connection, row: ClutchRow) -> KeptHistory:
 
 
 def _read(connection: Connection, row: ClutchRow) -> KeptHistory:
-    """All of it."""
+    """The complete history, read from the database."""
     accepted, held = _events(connection, row, runs.in_history(connection, row.clutch_id))
     return KeptHistory(
         revision=row.revision,
@@ -95,7 +95,7 @@ def _read(connection: Connection, row: ClutchRow) -> KeptHistory:
 
 
 def _continued(connection: Connection, row: ClutchRow, before: KeptHistory) -> KeptHistory | None:
-    """A history with the runs that were appended since; None where anything else has changed."""
+    """The kept history with later runs appended; None if there was any other change."""
     appended = appended_since(connection, row.clutch_id, before.revision, before.last_key, row.revision)
     if appended is None or _new_levels(row) != before.new_levels:
         return None
@@ -111,7 +111,7 @@ def _continued(connection: Connection, row: ClutchRow, before: KeptHistory) -> K
 
 
 def _size(events: Sequence[Event]) -> int:
-    """About how many bytes they take."""
+    """The approximate memory of these events [bytes]."""
     each = (_RUN + _COF * len(event.cofs) + _DRAW * sum(map(len, event.under.values())) for event in events)
     return sum(each)
 
@@ -119,8 +119,8 @@ def _size(events: Sequence[Event]) -> int:
 def appended_since(
     connection: Connection, clutch_id: str, revision: int, last_key: int, now: int
 ) -> list[RunInOrder] | None:
-    """The runs by which a clutch came from a revision, when it had runs up to a key, to its present one, in the order of
-    their arrival; None where something else has changed it too."""
+    """The runs appended between a revision and the present one, in order of arrival, given the greatest key at that
+    revision; None if there was any other change."""
     if now <= revision:
         return None
     rows = sorted(runs.after_key(connection, clutch_id, last_key), key=lambda run: run.run_key)
@@ -130,8 +130,8 @@ def appended_since(
 def _events(
     connection: Connection, row: ClutchRow, rows: Sequence[RunInOrder], beyond: int = 0
 ) -> tuple[list[Event], list[Event]]:
-    """Accepted runs as the history sees them, mean COF as the model in force corrects it; and held ones, with the mean COFs
-    that they would have in it. All of them have keys `beyond` that one."""
+    """The accepted runs as events, with mean COF as corrected by the model in force, and the held runs with the mean
+    COFs that they would have; only runs with keys `beyond` that one."""
     runs.refuse_damaged(connection, row.clutch_id, beyond)
     cofs = results.cofs_of(connection, row.clutch_id, beyond)
     corrected, new_levels = assumptions.corrected_cofs_of(connection, row.clutch_id, beyond), _new_levels(row)
@@ -169,14 +169,14 @@ def levels(connection: Connection, clutch_id: str) -> dict[str, list[LevelFit]]:
 
 
 def _levels(connection: Connection, clutch_id: str, beyond: int = 0) -> dict[str, list[LevelFit]]:
-    """Those of runs with keys `beyond` that one, by their order."""
+    """The fits of runs with keys `beyond` that one, in their order."""
     names = {run_key: run_id for run_id, run_key in runs.keys(connection, clutch_id).items()}
     of_runs = results.fits_of(connection, clutch_id, beyond)
     return {names[run_key]: [level_fit(row) for row in rows] for run_key, rows in of_runs.items()}
 
 
 def level_fit(row: FitRow) -> LevelFit:
-    """The inverse of `repository.fit_rows`, exactly."""
+    """A stored fit as a value, the exact inverse of `repository.fit_rows`."""
     fit = StribeckFit(
         **{name: getattr(row, name) for name in FIT_COLUMNS},
         parameters=StribeckParameters(**{name: getattr(row, name) for name in PARAMETER_NAMES}),
@@ -193,7 +193,7 @@ def _new_levels(row: ClutchRow) -> frozenset[str]:
 
 
 def event_of(row: RunInOrder, cofs: ByPressure) -> Event:
-    """A stored run as the history sees it."""
+    """A stored run as an event of the history."""
     low, high = row.lowest_speed, row.highest_speed
     moment, dated = moment_of(row.started_at, row.received_at)
     return Event(

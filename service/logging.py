@@ -42,14 +42,14 @@ start = logging.getLogger("clutchlife.start")
 
 
 def sane(sent: bytes) -> str | None:
-    """An id that a caller gave, where it is 1 to 128 visible characters of ASCII; else None."""
+    """A request id given by a caller, if it has 1 to 128 visible ASCII characters; else None."""
     return sent.decode("ascii") if _SANE.fullmatch(sent) else None
 
 
 def configure(form: LogFormat, level: LogLevel, stream: TextIO | None = None) -> None:
-    """Have all loggers of this process write so, the server's and Python's warnings too: to standard error, or `stream`.
+    """Configure all logging of this process, the server's and Python's warnings too, to standard error or `stream`.
 
-    `auto` is text where that is a terminal, JSON elsewhere.
+    `auto`: text on a terminal, JSON elsewhere.
     """
     written = sys.stderr if stream is None else stream
     plain = form == "text" or (form == "auto" and written.isatty())
@@ -64,7 +64,7 @@ def configure(form: LogFormat, level: LogLevel, stream: TextIO | None = None) ->
 
 
 def log_request(level: int, method: str, route: str, status: int, seconds: float, size: int, key: str | None) -> None:
-    """A line for a request that has been answered with `size` bytes: `key` is the name of its key, or who else asked."""
+    """Log an answered request with its `size` in bytes; `key`: its key's name, or another description of the caller."""
     fields = {
         "method": method,
         "route": route,
@@ -144,7 +144,7 @@ def _of_dropped(number: int) -> logging.LogRecord:
 
 
 class JsonLines(logging.Formatter):
-    """A record as one line of JSON: time, level, logger, process, message, and what is there of the rest."""
+    """Formats a log record as one line of JSON: time, level, logger, process, message, and other fields it has."""
 
     def format(self, record: logging.LogRecord) -> str:
         line: dict[str, Any] = {
@@ -163,7 +163,7 @@ class JsonLines(logging.Formatter):
 
 
 class TextLines(logging.Formatter):
-    """Log lines for people: `time LEVEL logger: message name=value ...`, with the traceback below."""
+    """Formats a log record for people: `time LEVEL logger: message name=value ...`, with the traceback below."""
 
     def format(self, record: logging.LogRecord) -> str:
         fields = dict(getattr(record, "fields", {}))

@@ -29,7 +29,7 @@ def to_cursor(place: Place | None) -> str | None:
 
 
 def from_cursor(cursor: str | None) -> Place | None:
-    """The inverse of `to_cursor`; InvalidError on anything else."""
+    """The place in a list that a cursor encodes, the inverse of `to_cursor`; InvalidError on anything else."""
     if cursor is None:
         return None
     try:
@@ -45,24 +45,24 @@ def from_cursor(cursor: str | None) -> Place | None:
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """Which part of a list is asked for: at most so many items, behind the place `after` which the part before ended."""
+    """The requested page of a list: at most `limit` items, after the place `after` at which the previous page ended."""
 
     limit: int = ALL_ITEMS
     after: Place | None = None
 
     @property
     def most(self) -> int:
-        """Rows to be read: whether there is one more than the items says whether there is a next part."""
+        """The number of rows to read: one more than the limit, to see whether another page follows."""
         return self.limit + 1
 
     @property
     def number(self) -> float | None:
-        """The number of the place, None at the beginning."""
+        """The number in the place `after`, None on the first page."""
         return None if self.after is None else self.after[0]
 
     @property
     def name(self) -> str:
-        """The name of the place, empty at the beginning."""
+        """The name in the place `after`, empty on the first page."""
         return "" if self.after is None else self.after[1]
 
     def of(
@@ -72,22 +72,22 @@ class Part:
         place: Callable[[Row], Place],
         item: Callable[[Row], object],
     ) -> Listed:
-        """The page with the items of the rows that were read, `most` of them, each of which has its `place` in the list."""
+        """The page with the items of up to `most` rows; `place` returns a row's place in the list."""
         return page(items=[item(row) for row in rows[: self.limit]], next=to_cursor(self.next(rows, place)))
 
     def next(self, rows: Sequence[Row], place: Callable[[Row], Place]) -> Place | None:
-        """Where the next part begins, None where these rows are the last."""
+        """The place at which the next page begins, None if these rows are the last."""
         return place(rows[self.limit - 1]) if len(rows) > self.limit else None
 
     def sliced(self, items: Sequence[Row]) -> "Slice[Row]":
-        """What is cut from a complete list; the cursor is the position in the list."""
+        """This page of a complete list; its cursor is the position in the list."""
         start = int(max(0.0, self.number or 0.0))
         stop = start + self.limit
         return Slice(items[start:stop], to_cursor((float(stop), "") if stop < len(items) else None))
 
 
 class Slice(NamedTuple, Generic[Row]):
-    """The items of a part of a complete list, and the cursor of the next part."""
+    """The items of one page of a complete list, and the next page's cursor."""
 
     items: Sequence[Row]
     next: str | None
@@ -98,17 +98,17 @@ WHOLE = Part()
 
 
 def by_name(name: str) -> Callable[[Any], Place]:
-    """The place of a row in a list that is ordered by a name, which is the field of that name."""
+    """A function that returns a row's place in a list ordered by the field of that name."""
     return lambda row: (0.0, getattr(row, name))
 
 
 def by_key(name: str) -> Callable[[Any], Place]:
-    """The place of a row in a list that is ordered by a number that no other row has."""
+    """A function that returns a row's place in a list ordered by a unique number."""
     return lambda row: (float(getattr(row, name)), "")
 
 
 def by_cycles(name: str) -> Callable[[Any], Place]:
-    """The place of a row in a list that is ordered by cycles, and at equal cycles by a name."""
+    """A function that returns a row's place in a list ordered by cycles and, at equal cycles, by a name."""
     return lambda row: (row.cycles, getattr(row, name))
 
 

@@ -85,7 +85,7 @@ BY_EVIDENCE = "evidence"
 
 
 def clutch(connection: Connection, clutch_id: str) -> ClutchRow:
-    """The clutch, or NotFoundError."""
+    """The clutch's row; NotFoundError if there is none."""
     row = clutches.get(connection, clutch_id)
     if row is None:
         raise unknown_clutch(clutch_id)
@@ -93,7 +93,7 @@ def clutch(connection: Connection, clutch_id: str) -> ClutchRow:
 
 
 def diagnosis(connection: Connection, clutch_id: str, diagnosis_id: str) -> DiagnosisRow:
-    """The diagnosis of a clutch, or NotFoundError."""
+    """A diagnosis of a clutch; NotFoundError if there is none."""
     row = diagnoses.get(connection, clutch_id, diagnosis_id)
     if row is None:
         raise NotFoundError(f"clutch {clutch_id!r} has no diagnosis {diagnosis_id!r}")
@@ -101,7 +101,7 @@ def diagnosis(connection: Connection, clutch_id: str, diagnosis_id: str) -> Diag
 
 
 def rig(connection: Connection, name: str) -> RigOut:
-    """A rig profile in force, or NotFoundError."""
+    """The rig profile in force under this name; NotFoundError if there is none."""
     row = rigs.get(connection, name)
     if row is None:
         names = ", ".join(repr(profile.name) for profile in rigs.page(connection, limit=10))
@@ -110,7 +110,7 @@ def rig(connection: Connection, name: str) -> RigOut:
 
 
 def rig_out(row: RigRow) -> RigOut:
-    """A stored profile, with the defaults of fields that came after it."""
+    """A stored profile; fields that it lacks, because they are newer, have their defaults."""
     return of_row(RigOut, row, **dict(RigIn.model_validate(row.content)))
 
 
@@ -128,7 +128,7 @@ def state(
     newest_prior: bool = False,
     damaged: bool = False,
 ) -> ClutchHistory:
-    """The clutch's state at its present revision. Raises NotFoundError.
+    """The clutch's history at its present revision, with priors and adopted models. Raises NotFoundError.
 
     `also`: an extension that may come into force; what fleets taught for its severity is loaded beside the others'.
     `edited`: a record that is about to come into force in place of the stored one.
@@ -162,14 +162,15 @@ def state(
 
 
 def adoption(connection: Connection, clutch_id: str) -> Adoption | None:
-    """What was adopted last of the lives that are in the history, None under the baseline; whether it is in force the
-    present life tells."""
+    """The newest adopted model among the lives in the history, None under the baseline. Whether it is in force depends
+    on the present life."""
     adopted = _adoptions(connection, clutch_id)
     return newest_adoption(adopted, [row.run_id for row in runs.rebuilds(connection, clutch_id)])
 
 
 def _adoptions(connection: Connection, clutch_id: str) -> tuple[Adoption | None, ...]:
-    """What was adopted, newest first, as far back as any history could ask for: one of each life."""
+    """The adopted models, newest first, at most one per life, back to the last return to the baseline (None) or the
+    clutch's first life."""
     adopted: dict[str, Adoption] = {}
     for row in assumptions.adoptions_of(connection, clutch_id):
         diagnosed = None if row.diagnosis_id is None else diagnoses.get(connection, clutch_id, row.diagnosis_id)
@@ -186,63 +187,64 @@ def _adoptions(connection: Connection, clutch_id: str) -> tuple[Adoption | None,
 
 
 def present_life(connection: Connection, clutch_id: str) -> str:
-    """The name of the present life: the run_id of the rebuild that began it, "" where there was none."""
+    """The present life's name: the run_id of the rebuild that began it, "" if there was none."""
     rebuilds = order([event_of(row, {}) for row in runs.rebuilds(connection, clutch_id)])
     return rebuilds[-1].run_id if rebuilds else ""
 
 
 def events(connection: Connection, clutch_id: str) -> tuple[Event, ...]:
-    """All accepted runs of a clutch as its history sees them, ordered; mean COF as the model in force corrects it."""
+    """All accepted runs of a clutch as events of its history, in order; mean COF is corrected by the model in force."""
     return history(connection, clutch(connection, clutch_id)).events
 
 
 def set_aside(connection: Connection, clutch_id: str) -> dict[str, Event]:
-    """The runs that are held or were withdrawn by run_id, as the history would see them; their mean COFs yet to come."""
+    """The held and withdrawn runs by run_id, as events of the history without their mean COFs."""
     return {row.run_id: replace(event_of(row, {}), confirmed=False) for row in runs.set_aside(connection, clutch_id)}
 
 
 def levels(connection: Connection, clutch_id: str) -> dict[str, list[LevelFit]]:
-    """The fits of all runs of a clutch, by run_id."""
+    """The fits at each pressure level of all runs of a clutch, by run_id."""
     return levels_of(connection, clutch_id)
 
 
 def json_of(answer: Answer) -> Json:
-    """An answer's part as a JSON column keeps it."""
+    """A model's set fields as the value of a JSON column."""
     return answer.model_dump(mode="json", exclude_unset=True)
 
 
 def prediction(row: PredictionRow) -> LifePrediction:
-    """A stored prediction."""
+    """The prediction in a stored row."""
     return LifePrediction.model_validate(row.payload)
 
 
 def receipt(row: RunRow) -> Receipt:
-    """A run's receipt as it is now: as it is stored, and whether the run counts, why not, and the cycles as sent."""
+    """A run's present receipt: the stored one with the run's state, doubts, cycles as sent, and sender."""
     sent_cycles = row.cycles if row.sent_cycles is None else row.sent_cycles
     present = {"state": row.state, "doubts": row.doubts, "sent_cycles": whole(sent_cycles)}
     return Receipt.model_validate(row.receipt | present | {"received_by": row.received_by})
 
 
 def summary(row: RunRow) -> dict[str, Any]:
-    """What the audit trail keeps of a run before and after a change."""
+    """The fields of a run that the audit trail records before and after a change."""
     return {"state": row.state, "cycles": whole(row.cycles), "doubts": list(row.doubts)}
 
 
 def receipts(connection: Connection, clutch_id: str) -> dict[str, Evaluation]:
-    """All receipts of a clutch by run_id, as they are stored."""
+    """All stored receipts of a clutch by run_id."""
     return {row.run_id: Evaluation.model_validate(row.receipt) for row in runs.page(connection, clutch_id)}
 
 
 def answers(connection: Connection, clutch_id: str) -> list[Any]:
-    """Receipts, predictions, summary and history as they are stored: whether they have changed decides on a new revision."""
+    """Stored receipts, predictions, summary and history of a clutch, compared before and after a change to decide on a
+    new revision."""
     tracks = [results.predictions_of(connection, clutch_id, method, ALL_PRESSURES) for method in PREDICTED]
     past = history(connection, clutch(connection, clutch_id))
     return [receipts(connection, clutch_id), tracks, clutch(connection, clutch_id).summary, past.events, past.held]
 
 
 def store_change(connection: Connection, clutch_id: str, computed: Results, *, by: str, at: str) -> int:
-    """Store the results of a run that came in or was changed, and what it changes in others. Returns the clutch's revision,
-    which moves on."""
+    """Store the results of a new or changed run and its effects on other runs, and move the clutch's revision on;
+    returns the new revision."""
     store(connection, clutch_id, computed)
     revision = clutches.bump_revision(connection, clutch_id)
     _store_judged(connection, clutch_id, computed.judged, at=at, revision=revision)
@@ -252,7 +254,7 @@ def store_change(connection: Connection, clutch_id: str, computed: Results, *, b
 
 
 def _store_judged(connection: Connection, clutch_id: str, judged: Judged, *, at: str, revision: int) -> None:
-    """The states of runs that the evidence of others has changed, with the audit trail's entries."""
+    """Store the new states of runs that other runs' evidence accepted or held, each with an entry in the audit trail."""
     states = [(event, runs.ACCEPTED, changes.ACCEPT) for event in judged.accepted]
     states += [(event, runs.HELD, changes.DOUBT) for event in judged.held]
     for event, new_state, action in states:
@@ -269,12 +271,13 @@ def _store_judged(connection: Connection, clutch_id: str, judged: Judged, *, at:
 
 
 def unchanged(connection: Connection, clutch_id: str, revision: int) -> bool:
-    """Whether the clutch still is at the revision that results were computed from."""
+    """Whether the clutch is still at the revision from which results were computed."""
     return clutches.revision(connection, clutch_id) == revision
 
 
 def attempts(clutch_id: str) -> Iterator[int]:
-    """The numbers of the attempts to compute and store, from 1; raises BusyError where the clutch has changed at each."""
+    """Numbers of attempts to compute and store, from 1; raises BusyError after the last, because the clutch changed
+    during each."""
     yield from range(1, MAX_ATTEMPTS + 1)
     raise BusyError(
         f"clutch {clutch_id!r} was changed by other requests {MAX_ATTEMPTS} times during this request: send it again"
@@ -282,8 +285,8 @@ def attempts(clutch_id: str) -> Iterator[int]:
 
 
 def replace_results(database: Database, state: ClutchHistory, computed: Results, *, damaged: bool = False) -> bool:
-    """Store a clutch's results where its revision still is that of the state they follow from; whether it was. The revision
-    moves on where an answer changes, or where what is replaced may be `damaged`."""
+    """Store a clutch's results if its revision is still that of `state`; false if it is not. The revision moves on if
+    an answer changes, or if the replaced results may be `damaged`."""
     with database.writing() as connection:
         if damaged:
             allow_damage(connection)
@@ -300,7 +303,7 @@ def replace_results(database: Database, state: ClutchHistory, computed: Results,
 
 
 def store(connection: Connection, clutch_id: str, computed: Results) -> None:
-    """Store results in place of those that were there. The revision is the change's to move on."""
+    """Replace a clutch's stored results by these. The caller moves the revision on."""
     if computed.levels or computed.receipts or computed.corrected:
         rows = runs.keys(connection, clutch_id)
         for run_id, own in computed.levels.items():
@@ -332,8 +335,8 @@ def store(connection: Connection, clutch_id: str, computed: Results) -> None:
 
 
 def ask_fleet_refresh(connection: Connection, kind: Kind | None, *, by: str, at: str, learned: bool = False) -> None:
-    """Have the fleet of a kind (None: all) learn again, for what an ended life teaches has changed; where it has `learned`,
-    only have its clutches tracked under that. Unless a job that will do it waits already."""
+    """Queue a refresh of a kind's fleet prior (None: all kinds), because the lessons of an ended life have changed,
+    unless an equal job waits. `learned`: the prior is up to date, and only its clutches are tracked again."""
     fleet = None if kind is None else assumptions.fleet_key(json_of(kind))
     for row in jobs.open_of(connection, jobs.FLEET_REFRESH):
         if row.state == jobs.WAITING and row.of in (fleet, None) and row.arguments.get("learned", False) <= learned:
@@ -392,7 +395,7 @@ def _filters(connection: Connection, row: ClutchRow) -> States | None:
 def _learned_prior(
     connection: Connection, own: ClutchIn, severity: Severity, tracked: LifePrediction | None
 ) -> LearnedPrior:
-    """The prior of the clutch's kind not learned from it: the one that the prediction `tracked` names, or the newest."""
+    """The fleet's prior, learned without this clutch: the version named by the prediction `tracked`, or the newest."""
     version = None
     if tracked is not None and tracked.severity == severity_name(severity):
         version = tracked.prior.version or 0
@@ -410,7 +413,7 @@ def _learned_prior(
 
 
 def fit_rows(own: Sequence[LevelFit], cofs: ByPressure) -> list[FitRow]:
-    """Fits as they are stored, with mean COF by pressure where a level determines it."""
+    """The rows of these fits, with mean COF by pressure if the level determines it."""
     rows = []
     for level in own:
         fit = level.fit
@@ -434,7 +437,7 @@ def fit_rows(own: Sequence[LevelFit], cofs: ByPressure) -> list[FitRow]:
 
 
 def latest_diagnosis(row: ClutchRow, verdict: VerdictRow | None) -> LatestDiagnosis | None:
-    """The newest finished diagnosis as it goes out; one of a life that a rebuild has ended is past."""
+    """The newest finished diagnosis as sent to clients; if a rebuild has ended its life, it can no longer be adopted."""
     if verdict is None:
         return None
     earlier = verdict.life != row.summary.get("life", "")
@@ -454,14 +457,14 @@ def condition(row: ClutchRow) -> dict[str, str]:
 
 
 def first_line(row: ClutchRow, diagnosis: LatestDiagnosis | None, *, raised: int) -> dict[str, str]:
-    """What stands first of the clutch: `headline` and `action`; `diagnosis` is its newest one as it goes out, `raised` how
-    many of its alarms nobody has acknowledged."""
+    """The clutch's `headline` and `action`. `diagnosis`: its newest one as sent to clients; `raised`: its number of
+    unacknowledged alarms."""
     return top_line(row.summary, disputed=row.is_disputed, diagnosis=diagnosis, silent=row.silent, raised=raised)
 
 
 def note_dispute(connection: Connection, clutch_id: str) -> None:
-    """Note whether data and model are in dispute, and the state that follows: where a diagnosis has been finished, a model
-    adopted or the baseline restored. A dispute stays noted of its life, and counts while that is the present one."""
+    """Store whether data and model disagree, and the clutch's state that follows; called after a diagnosis, an adoption
+    or a return to the baseline. A dispute belongs to one life and counts while that is the present one."""
     verdict = diagnoses.newest(connection, [clutch_id]).get(clutch_id)
     disputed = None if verdict is None or verdict.adopted or verdict.verdict not in DISAGREES else verdict.life
     row = replace(clutch(connection, clutch_id), disputed=disputed)
@@ -470,7 +473,7 @@ def note_dispute(connection: Connection, clutch_id: str) -> None:
 
 
 def inspection(connection: Connection, clutch_id: str, inspection_id: str) -> InspectionRow:
-    """The inspection, or NotFoundError."""
+    """The inspection's row; NotFoundError if there is none."""
     row = inspections.get(connection, clutch_id, inspection_id)
     if row is None:
         raise NotFoundError(f"clutch {clutch_id!r} has no inspection {inspection_id!r}")
@@ -478,12 +481,12 @@ def inspection(connection: Connection, clutch_id: str, inspection_id: str) -> In
 
 
 def inspection_hash(content: Mapping[str, Any]) -> str:
-    """The sha256 of what an inspection states."""
+    """The sha256 of an inspection's content."""
     return content_of({**content, "performed_at": instant(content["performed_at"])})
 
 
 def inspection_answers(connection: Connection, rows: Sequence[InspectionRow]) -> list[InspectionOut]:
-    """Inspections with their photographs."""
+    """Inspections with their photographs, as sent to clients."""
     photographs = inspections.photographs(connection, [row.inspection_key for row in rows])
     return [
         of_row(
@@ -498,12 +501,13 @@ def inspection_answers(connection: Connection, rows: Sequence[InspectionRow]) ->
 
 
 def photograph_answer(row: PhotographRow) -> PhotographOut:
-    """A photograph as it goes out."""
+    """A photograph's description as sent to clients."""
     return of_row(PhotographOut, row, photograph_id=row.sha256)
 
 
 def evidence(connection: Connection, clutch_id: str, *, of_fits: bool = False) -> ClutchMeasurements:
-    """What was measured of a clutch, of held runs too; without a reader of its runs. `of_fits`: nothing but fits."""
+    """Stored fits, receipts and engagements of all runs of a clutch, held ones too, without a reader of its runs.
+    `of_fits`: fits alone."""
     return ClutchMeasurements(
         levels=levels(connection, clutch_id),
         receipts={} if of_fits else receipts(connection, clutch_id),
@@ -512,7 +516,7 @@ def evidence(connection: Connection, clutch_id: str, *, of_fits: bool = False) -
 
 
 def evidence_for(database: Database, state: ClutchHistory, reader: RunReader) -> ClutchMeasurements | None:
-    """What a clutch's summary follows from beside its tracks; None where these are enough."""
+    """The measurements that a clutch's summary needs in addition to its tracks; None if the tracks suffice."""
     if not needs_evidence(state):
         return None
     with database.reading() as connection:
@@ -522,7 +526,7 @@ def evidence_for(database: Database, state: ClutchHistory, reader: RunReader) ->
 def tracked_again(
     database: Database, state: ClutchHistory, levels: Levels, receipts: Mapping[str, Evaluation]
 ) -> Results:
-    """Results of a clutch whose state has changed while its runs are unchanged."""
+    """A clutch's results after a change of its state, with the fits of its runs unchanged."""
     reader = run_reader(database, state.clutch_id)
     final, computed = computed_again(state, levels, receipts, reader, evaluated=state.stationary_tests)
     evidence = evidence_for(database, final, reader)
@@ -530,13 +534,13 @@ def tracked_again(
 
 
 def engagements(connection: Connection, clutch_id: str) -> list[MeasuredEngagement]:
-    """The accepted engagements of a clutch with all indicators, by life and cycles."""
+    """The accepted engagements that have all indicators, by life and cycles."""
     stored = _engagements(connection, clutch_id)
     return engagement_rows(lives_of(events(connection, clutch_id)), stored) if stored else []
 
 
 def _at(row: RunRow) -> Evaluation:
-    """A run's receipt with its present cycles."""
+    """A run's stored receipt with the run's present cycles."""
     return Evaluation.model_validate(row.receipt | {"cycles": whole(row.cycles)})
 
 
@@ -547,7 +551,7 @@ def _engagements(connection: Connection, clutch_id: str) -> dict[str, StoredEnga
 
 
 def run(connection: Connection, clutch_id: str, run_id: str) -> RunRow:
-    """The run of a known clutch, or NotFoundError."""
+    """The run's row; NotFoundError if the clutch or the run is unknown."""
     clutch(connection, clutch_id)
     row = runs.get(connection, clutch_id, run_id)
     if row is None:
@@ -556,7 +560,8 @@ def run(connection: Connection, clutch_id: str, run_id: str) -> RunRow:
 
 
 def run_reader(database: Database, clutch_id: str, *, damaged: bool = False) -> RunReader:
-    """The clutch's stored runs, each read in a transaction of its own when it is asked for: none stays open meanwhile."""
+    """A reader of the clutch's stored runs; each read has a transaction of its own, so that none stays open between
+    reads."""
 
     def read(run_id: str, *, whole: bool = True) -> IncomingRun:
         with database.reading() as connection:
@@ -581,14 +586,15 @@ def run_reader(database: Database, clutch_id: str, *, damaged: bool = False) -> 
 
 
 def placed(database: Database, columns: raw_columns.Encoded) -> raw_columns.Encoded:
-    """The long columns of a run put into the store of raw records, where one is in use: before the row that names them."""
+    """The run's columns, with the long ones moved to the store of raw records if one is in use; call it before the
+    run's row is inserted."""
     with database.reading() as connection:
         store = raw_stores.in_use(connection)
     return columns if store is None else columns.put(store)
 
 
 def _loaded_reader(database: Database, record: ClutchIn, rows: Sequence[RunRow]) -> RunReader:
-    """A reader of runs whose stored channels are all in memory, so that it needs no database."""
+    """A reader with all stored channels in memory, so that it needs no database and can be pickled."""
     loaded = {}
     for row in rows:
         with database.reading() as connection:
@@ -606,12 +612,12 @@ def _loaded_reader(database: Database, record: ClutchIn, rows: Sequence[RunRow])
 def _read_loaded(
     rows: Mapping[str, RunRow], loaded: Mapping[str, tuple[raw_columns.Stored, ...]], run_id: str
 ) -> IncomingRun:
-    """A run with the channels that are loaded of it; a function of the module, which can be pickled."""
+    """A run with its loaded channels; a module-level function, so that it can be pickled."""
     return decoded(rows[run_id], loaded.get(run_id, ()))
 
 
 def decoded(row: RunRow, columns: Sequence[raw_columns.Stored]) -> IncomingRun:
-    """A run with its channels. Raises DamagedData, naming the run."""
+    """A stored run with its channels. Raises DamagedData, naming the run."""
     try:
         return incoming(row, raw_columns.values_of(columns))
     except DamagedData as error:
@@ -619,15 +625,14 @@ def decoded(row: RunRow, columns: Sequence[raw_columns.Stored]) -> IncomingRun:
 
 
 def content_now(row: RunRow, sent: IncomingRun) -> str:
-    """The hash of what is stored of a run, to be compared with the one that its sender was given."""
+    """The hash of a run's stored content, for comparison with the hash in its receipt."""
     sha256 = content_hash(replace(sent, cycles=row.cycles if row.sent_cycles is None else row.sent_cycles))
     read_again = row.details.get("file", {}).get("content_sha256")
     return row.content_sha256 if sha256 == read_again else sha256
 
 
 def _refuse_restated(row: RunRow, trail: Mapping[str, Any]) -> None:
-    """Raise DamagedData where a run has not the state or the cycles that the audit trail says: neither follows from what was
-    sent."""
+    """Raise DamagedData if a run's state or cycles differ from the audit trail: the sent content cannot restore them."""
     now = summary(row)
     for name, stated in ({"state": runs.ACCEPTED} | dict(trail)).items():
         if name in ("state", "cycles") and now[name] != stated:
@@ -636,7 +641,7 @@ def _refuse_restated(row: RunRow, trail: Mapping[str, Any]) -> None:
 
 
 def _refuse_changed(database: Database, row: RunRow) -> None:
-    """Raise DamagedData where what is stored of a run is not what was sent."""
+    """Raise DamagedData if a run's stored content differs from the content sent."""
     with database.reading() as connection:
         columns = raw_columns.stored_of_run(connection, row.run_key)
     try:
@@ -663,8 +668,8 @@ def incoming(row: RunRow, columns: Mapping[str, NDArray[np.float64]]) -> Incomin
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Recorded:
-    """All that a clutch's results are computed from: its state, its runs in the order of their arrival, those that are none
-    of the history, and their channels. Picklable where it was loaded whole."""
+    """The input of a clutch's results: its history, its runs in order of arrival, the held and withdrawn runs as
+    events, and a reader of the channels. It can be pickled if it was loaded `whole`."""
 
     state: ClutchHistory
     rows: tuple[RunRow, ...]
@@ -673,8 +678,8 @@ class Recorded:
 
 
 def recorded(database: Database, state: ClutchHistory, *, whole: bool = False, damaged: bool = False) -> Recorded:
-    """The clutch's runs as they are stored; `whole` with all channels in memory, else each is read when it is needed.
-    `damaged`: what follows from what was sent may be damaged. Raises DamagedData where what was sent is."""
+    """The input of a clutch's results, read from the database; `whole`: with all channels in memory, else each is read
+    when needed. `damaged`: stored results may be damaged. Raises DamagedData if sent content is damaged."""
     with database.reading() as connection:
         if damaged:
             allow_damage(connection)
@@ -696,7 +701,7 @@ def recorded(database: Database, state: ClutchHistory, *, whole: bool = False, d
 
 
 def recomputed(recorded: Recorded) -> Results:
-    """Every run of a clutch analysed again, under the state's record, and all that follows.
+    """All results of a clutch, with every run analysed again under the state's record.
 
     Raises InvalidError where this code refuses a run that is stored, DamagedData where its channels are damaged.
     """
@@ -733,7 +738,7 @@ def recomputed(recorded: Recorded) -> Results:
 
 
 def mend(database: Database, clutch_id: str, damage: DamagedData) -> None:
-    """Compute all results of a clutch again from its runs, in place of those of which some are damaged.
+    """Replace all results of a clutch, some of them damaged, by results recomputed from its runs.
 
     Raises DamagedData where what was sent is damaged too, InvalidError as `recomputed` does.
     """

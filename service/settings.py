@@ -29,7 +29,7 @@ _SEGMENT = re.compile(r"[A-Za-z0-9._~-]+")
 
 
 def _below(path: str) -> str:
-    """The path as `/clutch`, without a slash at its end; empty where there is none. Raises ValueError."""
+    """The root path in the form `/clutch`, without a slash at its end; may be empty. Raises ValueError."""
     path = path.strip("/")
     segments = path.split("/")
     if (path and not all(map(_SEGMENT.fullmatch, segments))) or {".", ".."} & set(segments):
@@ -40,8 +40,8 @@ def _below(path: str) -> str:
 
 
 class Settings(BaseSettings):
-    """The service's settings, by the environment where they are not given. The defaults are chosen; those of limits have no
-    table unless they name one."""
+    """The service's settings, from the environment unless given. The defaults are chosen; those of limits have no table
+    unless they name one."""
 
     model_config = SettingsConfigDict(env_prefix=PREFIX, frozen=True, extra="forbid")
 
@@ -130,7 +130,8 @@ class Settings(BaseSettings):
 
     @classmethod
     def from_environment(cls, **given: Any) -> "Settings":
-        """Settings from the environment; what is given here wins. Raises ValueError, a line that names all wrong ones."""
+        """Settings from the environment; given values take precedence. Raises ValueError with one line that names all
+        wrong settings."""
         try:
             return cls(**given)
         except ValidationError as error:
@@ -138,7 +139,8 @@ class Settings(BaseSettings):
         raise ValueError(wrong)
 
     def to_environment(self) -> None:
-        """Set the environment so that `from_environment` gives these settings, in this process and those it starts."""
+        """Set environment variables such that `from_environment` gives these settings, in this process and its
+        children."""
         for name, value in self.model_dump().items():
             variable = f"{PREFIX}{name.upper()}"
             if value is None:
@@ -148,7 +150,7 @@ class Settings(BaseSettings):
 
     @classmethod
     def misspelt(cls) -> Iterator[str]:
-        """Variables of the environment that look like a setting and are none, each as a line.
+        """A line for each environment variable that resembles a setting but is none.
 
         Variables of the commands (`CLUTCHLIFE_URL`, ...) resemble none; names that an orchestrator makes of a service called
         clutchlife (`CLUTCHLIFE_PORT_8000_TCP`) do not either.
@@ -164,12 +166,12 @@ class Settings(BaseSettings):
 
 
 def redacted(address: str) -> str:
-    """An address without its password, which may hold an @, and without its options, which may hold one."""
+    """An address without its password (which may hold an @) and its options (one of which may be a password)."""
     return re.sub(r"\?.*", "?***", re.sub(r"://([^:/@]*):.*@", r"://\1:***@", address))
 
 
 def _wrong(details: Any) -> str:
-    """One wrong variable, the rule and its value."""
+    """A line on one wrong variable: its name, the rule and its value."""
     least = details.get("ctx", {}).get("ge")
     rules = {"int_parsing": "a whole number", "greater_than_equal": f"a whole number of at least {least}"}
     rule = rules.get(details["type"], details["msg"].removeprefix("Input should be ").removeprefix("Value error, "))

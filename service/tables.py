@@ -10,5 +10,5 @@ Cells: TypeAlias = dict[str, object]
 
 
 def cells(answer: BaseModel, names: Iterable[str]) -> Cells:
-    """Fields of an answer by their names."""
+    """An answer's fields of these names as a table row."""
     return {name: getattr(answer, name) for name in names}

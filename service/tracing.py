@@ -18,14 +18,14 @@ Carrier = Mapping[str, str]
 
 
 def carried() -> Carrier:
-    """Where the present span is, to be sent along; empty without one."""
+    """The present span's context, to be sent with a call; empty without a span."""
     carrier: dict[str, str] = {}
     propagate.inject(carrier)
     return carrier
 
 
 def name_of(function: Callable[..., object]) -> str:
-    """A function's name, without the arguments that it already has."""
+    """The name of a function; for a partial, of the function within."""
     while isinstance(function, partial):
         function = function.func
     return getattr(function, "__name__", type(function).__name__)
@@ -33,6 +33,6 @@ def name_of(function: Callable[..., object]) -> str:
 
 @contextmanager
 def span_below(carrier: Carrier, name: str, kind: SpanKind = SpanKind.INTERNAL) -> Iterator[Span]:
-    """A span of that name, below the one that was sent along."""
+    """Context with a span of that name, below the span whose context was sent."""
     with tracer.start_as_current_span(name, context=propagate.extract(carrier), kind=kind) as span:
         yield span

@@ -17,7 +17,8 @@ RAISED, ACKNOWLEDGED, CLEARED = "raised", "acknowledged", "cleared"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AlarmRow:
-    """A rule in force: `content` as it was posted with its defaults, of one clutch or (None) several; who saved it when."""
+    """A rule in force: `content` as posted, with its defaults, for one clutch or (None) several, and its author and
+    time."""
 
     alarm_id: str
     clutch_id: str | None
@@ -29,7 +30,7 @@ class AlarmRow:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EventRow:
-    """An alarm; `mark` is what it is raised for, `content` what is said of it; the later raised, the greater its key."""
+    """An alarm; `mark` identifies its cause, `content` describes it; later alarms have greater keys."""
 
     event_id: str
     alarm_id: str
@@ -61,7 +62,7 @@ _IN_STATE = {
 
 
 def put(connection: Connection, row: AlarmRow) -> None:
-    """Store a rule, in the place of the one of that name."""
+    """Store a rule, replacing the one of that name."""
     upsert(connection, alarm, [_rules.values(row)])
 
 
@@ -76,7 +77,7 @@ def remove(connection: Connection, alarm_id: str) -> None:
 def page(
     connection: Connection, *, limit: int | None = None, after: str = "", only: Collection[str] | None = None
 ) -> list[AlarmRow]:
-    """Rules by name behind the name `after`; those of `only` these clutches."""
+    """Rules by name after the name `after`; limited to the clutches `only`."""
     query = select(alarm).where(alarm.c.alarm_id > after).order_by(alarm.c.alarm_id).limit(limit)
     if only is not None:
         query = query.where(among(alarm.c.clutch_id, sorted(only)))
@@ -84,7 +85,7 @@ def page(
 
 
 def enabled(connection: Connection, clutch_id: str | None = None) -> list[AlarmRow]:
-    """The rules that are in use, those that may be of a clutch where it is named."""
+    """The enabled rules, or with `clutch_id` the enabled rules that may apply to that clutch."""
     query = select(alarm).where(alarm.c.enabled == 1).order_by(alarm.c.alarm_id)
     if clutch_id is not None:
         query = query.where(or_(alarm.c.clutch_id.is_(None), alarm.c.clutch_id == clutch_id))
@@ -92,7 +93,7 @@ def enabled(connection: Connection, clutch_id: str | None = None) -> list[AlarmR
 
 
 def insert_event(connection: Connection, row: EventRow) -> None:
-    """Raise an alarm. Raises IntegrityError where the rule's alarm of the clutch is not cleared yet."""
+    """Store a raised alarm. Raises IntegrityError where the rule's alarm of the clutch is not cleared yet."""
     connection.execute(alarm_event.insert(), _events.values(row))
 
 
@@ -101,7 +102,7 @@ def event(connection: Connection, event_id: str) -> EventRow | None:
 
 
 def open_of_clutch(connection: Connection, clutch_id: str) -> dict[str, EventRow]:
-    """alarm_id -> the alarm of a clutch that is not cleared."""
+    """alarm_id -> the alarm of a clutch that is not yet cleared."""
     query = select(alarm_event).where(NOT_CLEARED, alarm_event.c.clutch_id == clutch_id)
     return {raised.alarm_id: raised for raised in _events.all(connection.execute(query))}
 
@@ -119,8 +120,8 @@ def events(
     alarm_id: str | None = None,
     only: Collection[str] | None = None,
 ) -> list[EventRow]:
-    """Alarms, newest first: in a state (`open`: raised or acknowledged), of a rule, of `only` these clutches; `before` is
-    the key of the last of the page before."""
+    """Alarms, newest first: in a state (`open`: raised or acknowledged), of a rule, limited to the clutches `only`;
+    `before`: the key of the previous page's last alarm."""
     query = newest_first(select(alarm_event), alarm_event.c.event_key, before=before, limit=limit)
     if state is not None:
         query = query.where(_IN_STATE[state])
@@ -132,7 +133,7 @@ def events(
 
 
 def raised(connection: Connection, only: Collection[str] | None = None) -> dict[str, list[EventRow]]:
-    """clutch_id -> its alarms that nobody has acknowledged, newest first; of `only` these clutches."""
+    """clutch_id -> its unacknowledged alarms, newest first; limited to the clutches `only`."""
     by_clutch: dict[str, list[EventRow]] = {}
     for row in events(connection, state=RAISED, only=only):
         by_clutch.setdefault(row.clutch_id, []).append(row)
@@ -140,7 +141,7 @@ def raised(connection: Connection, only: Collection[str] | None = None) -> dict[
 
 
 def count_raised(connection: Connection, only: Collection[str] | None = None) -> int:
-    """How many alarms nobody has acknowledged; of `only` these clutches."""
+    """The number of unacknowledged alarms; limited to the clutches `only`."""
     query = select(func.count()).select_from(alarm_event).where(_IN_STATE[RAISED])
     if only is not None:
         query = query.where(among(alarm_event.c.clutch_id, sorted(only)))
@@ -148,17 +149,17 @@ def count_raised(connection: Connection, only: Collection[str] | None = None) ->
 
 
 def clear(connection: Connection, event_id: str, at: str, content: Json) -> None:
-    """Note that what raised an alarm is over, with what is said of it from now on."""
+    """Mark an alarm as cleared, with its new content."""
     _change_event(connection, event_id, cleared_at=at, content=to_text(content))
 
 
 def reopen(connection: Connection, event_id: str) -> None:
-    """Note that an alarm is not over: it is as it was, acknowledged or not."""
+    """Undo the clearing of an alarm; it is raised or acknowledged as before."""
     _change_event(connection, event_id, cleared_at=None)
 
 
 def acknowledge(connection: Connection, event_id: str, *, at: str, by: str, note: str) -> None:
-    """Note who has seen an alarm, when, and what they remarked."""
+    """Mark an alarm as acknowledged, with author, time and note."""
     _change_event(connection, event_id, acknowledged_at=at, acknowledged_by=by, note=note)
 
 
@@ -167,7 +168,7 @@ def _change_event(connection: Connection, event_id: str, **columns: str | None) 
 
 
 def last_heard(connection: Connection, clutch_ids: Collection[str]) -> dict[str, str]:
-    """clutch_id -> when its last run arrived, by the clock of then, of those of these clutches that have one."""
+    """clutch_id -> arrival of its last run by the clock of that time, for those of these clutches that have a run."""
     last = select(func.max(run.c.run_key)).where(among(run.c.clutch_id, sorted(clutch_ids))).group_by(run.c.clutch_id)
     rows = connection.execute(select(run.c.clutch_id, run.c.received_at).where(run.c.run_key.in_(last)))
     return {row.clutch_id: row.received_at for row in rows}

@@ -22,7 +22,7 @@ CorrectedCof: TypeAlias = tuple[float, float, tuple[float, ...]]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AdoptedRow:
-    """A version from 1 on; `diagnosis_id` None is a return to the baseline."""
+    """An adopted model's version, from 1 on; `diagnosis_id` None: a return to the baseline."""
 
     version: int
     diagnosis_id: str | None
@@ -33,13 +33,13 @@ _adoptions = Rows(AdoptedRow, of=adopted_model)
 
 
 def _adopted(clutch_id: str) -> Select[Any]:
-    """The versions of a clutch, the newest first."""
+    """The adopted versions of a clutch, newest first."""
     of_clutch = select(adopted_model).where(adopted_model.c.clutch_id == clutch_id)
     return of_clutch.order_by(adopted_model.c.version.desc())
 
 
 def current_adoption(connection: Connection, clutch_id: str) -> AdoptedRow | None:
-    """The version in force, None before the first."""
+    """The newest adopted version, None before the first."""
     return _adoptions.first(connection.execute(_adopted(clutch_id).limit(1)))
 
 
@@ -48,13 +48,13 @@ def adoptions_of(connection: Connection, clutch_id: str) -> list[AdoptedRow]:
 
 
 def insert_adoption(connection: Connection, clutch_id: str, row: AdoptedRow) -> None:
-    """Store a version. Raises IntegrityError where it is there or its diagnosis unknown."""
+    """Store an adopted version. Raises IntegrityError where it is there or its diagnosis unknown."""
     connection.execute(adopted_model.insert(), _adoptions.values(row, clutch_id=clutch_id))
 
 
 def corrected_cofs_of(connection: Connection, clutch_id: str, beyond: int = 0) -> dict[int, dict[float, CorrectedCof]]:
-    """run_key -> pressure -> mean COF, its deviation, and mean COF under each draw of the model in force, where it corrects
-    them. Of runs with keys `beyond` that one."""
+    """run_key -> pressure -> mean COF, its standard deviation, and mean COF under each draw, of the runs that the model
+    in force corrects, with keys `beyond` that one."""
     cofs: dict[int, dict[float, CorrectedCof]] = {}
     query = (
         select(corrected_cof)
@@ -73,7 +73,7 @@ def corrected_cofs_of(connection: Connection, clutch_id: str, beyond: int = 0) -
 
 
 def write_corrected_cofs(connection: Connection, run_key: int, cofs: Mapping[float, CorrectedCof]) -> None:
-    """Store a run's corrected mean COFs by pressure in place of those it had."""
+    """Replace a run's corrected mean COFs by pressure."""
     connection.execute(delete(corrected_cof).where(corrected_cof.c.run_key == run_key))
     names = ("run_key", "pressure", "mean_cof", "mean_cof_sd", "mean_cof_draws")
     rows = [(run_key, pressure, mean, sd, to_text(list(draws))) for pressure, (mean, sd, draws) in cofs.items()]
@@ -98,8 +98,8 @@ _GROUPS = 20
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FleetPriorRow:
-    """A prior: `fleet` is the kind of clutch, `left_out` the clutch that was not learned from, or NOBODY; where several were
-    not, as in `groups`, the first of them."""
+    """A prior: `fleet` is the kind of clutch, `left_out` the clutch not learned from, or NOBODY; of a group left out
+    together (`groups`), its first clutch."""
 
     fleet: Json
     version: int
@@ -133,30 +133,31 @@ _fleet_ended_lives = _fleet_all_current.with_only_columns(
 
 
 def insert_fleet_prior(connection: Connection, row: FleetPriorRow) -> None:
-    """Store a prior. Raises IntegrityError where this version is there."""
+    """Store a prior. Raises IntegrityError if this version is stored already."""
     connection.execute(fleet_prior.insert(), _priors.values(row, fleet=fleet_key(row.fleet)))
 
 
 def current_fleet_prior(connection: Connection, fleet: Json) -> FleetPriorRow | None:
-    """The newest version of a kind of clutch, learned from all of them; None before the first."""
+    """The newest prior of a kind of clutch, learned from all its clutches; None before the first."""
     return _priors.first(connection.execute(_versions(fleet).limit(1)))
 
 
 def _versions(fleet: Json) -> Select[Any]:
-    """The versions of a kind of clutch that were learned from all, the newest first."""
+    """The versions of a kind's prior learned from all its clutches, newest first."""
     of_fleet = select(fleet_prior).where(fleet_prior.c.fleet == fleet_key(fleet), _from_all)
     return of_fleet.order_by(fleet_prior.c.version.desc())
 
 
 def groups(members: Sequence[str]) -> list[Sequence[str]]:
-    """The clutches of a fleet, ascending, in the groups that are left out together: each alone, if there are few."""
+    """The clutches of a fleet in ascending order, in groups that are left out together; with few clutches each is a
+    group."""
     return [members[first::_GROUPS] for first in range(min(_GROUPS, len(members)))]
 
 
 def fleet_prior_for(connection: Connection, fleet: Json, clutch_id: str, version: int | None) -> FleetPriorRow | None:
-    """The prior of that version (the newest where it is None or gone, none where it is 0) that a clutch did not teach.
+    """The prior for a clutch, learned without it, in that version (None or deleted: the newest; 0: none).
 
-    None where there is none, or where too few other clutches were left.
+    None if there is none, or if too few other clutches were left.
     """
     if version == 0:
         return None
@@ -177,12 +178,12 @@ def current_fleet_priors(connection: Connection) -> list[FleetPriorRow]:
 
 
 def count_ended_lives(connection: Connection) -> int:
-    """How many ended lives the newest priors of all kinds know of."""
+    """The number of ended lives in the newest priors of all kinds."""
     return int(connection.execute(_fleet_ended_lives).scalar_one())
 
 
 def forget_left_out(connection: Connection, fleet: Json, *, before: int) -> None:
-    """Drop the priors with a clutch left out of all versions before `before`; those learned from all clutches stay."""
+    """Delete the priors learned without a clutch in versions before `before`; priors learned from all clutches stay."""
     of_fleet = delete(fleet_prior).where(fleet_prior.c.fleet == fleet_key(fleet), fleet_prior.c.version < before)
     connection.execute(of_fleet.where(~_from_all))
 

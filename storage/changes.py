@@ -23,8 +23,8 @@ SHOWN = ("at", "by", "action", "run_id", "reason", "before", "after")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ChangeRow:
-    """A stored change: `run_id` None where it is of the clutch, `revision` the clutch's after it; the later, the greater its
-    key."""
+    """An entry of the audit trail: `run_id` None if it is about the clutch; `revision`: the clutch's after it; later
+    entries have greater keys."""
 
     change_key: int
     clutch_id: str
@@ -71,7 +71,8 @@ def page(
     limit: int | None = None,
     before: float | None = None,
 ) -> list[ChangeRow]:
-    """Changes of a clutch and its runs, or of one run, newest first; `before` is the key of the last of the page before."""
+    """Changes of a clutch and its runs, or of one run, newest first; `before`: the key of the previous page's last
+    change."""
     query = newest_first(select(change), change.c.change_key, before=before, limit=limit)
     query = query.where(change.c.clutch_id == clutch_id)
     if run_id is not None:
@@ -80,11 +81,11 @@ def page(
 
 
 def newest_of_runs(connection: Connection, clutch_id: str) -> dict[str, Json]:
-    """What the trail says of a clutch's runs after the last change of each, by run_id; the others nobody changed."""
+    """run_id -> the run's fields after its last change by the audit trail, for the runs of a clutch that were changed."""
     return {row.run_id: row.after for row in reversed(page(connection, clutch_id)) if row.run_id is not None}
 
 
 def last_of_history(connection: Connection, clutch_id: str) -> int:
-    """The revision of the last change of what the clutch's history holds, 0 where there was none."""
+    """The revision of the last change that may alter the clutch's history, 0 if there was none."""
     of_history = (change.c.clutch_id == clutch_id, change.c.action.in_(OF_HISTORY))
     return connection.execute(select(func.max(change.c.revision)).where(*of_history)).scalar() or 0

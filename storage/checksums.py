@@ -24,7 +24,7 @@ _Plain = Callable[[Any], bytes]
 
 @cache
 def covered(table: sa.Table) -> tuple[tuple[str, _Plain], ...]:
-    """The columns that a table's checksums cover, by name, and how the value of each is turned to bytes."""
+    """The columns covered by a table's checksums, by name, each with its conversion to bytes."""
     key = list(table.primary_key)
     given = key[0].name if len(key) == 1 and isinstance(key[0].type, sa.Integer) else None
     names = sorted(column.name for column in table.columns if column.name not in (CHECKSUM, given))
@@ -42,7 +42,7 @@ def _plain(kind: Any) -> _Plain:
 
 
 def of_values(table: sa.Table, values: Mapping[str, Any]) -> int:
-    """The checksum of a row. NaN is stored as null."""
+    """The checksum of a row's values. NaN is stored as null."""
     parts = []
     for name, plain in covered(table):
         value = values[name]
@@ -51,12 +51,12 @@ def of_values(table: sa.Table, values: Mapping[str, Any]) -> int:
 
 
 def sealed(table: sa.Table, values: dict[str, Any]) -> dict[str, Any]:
-    """The columns of a row with its checksum."""
+    """The columns of a row with the checksum added."""
     return values | {CHECKSUM: of_values(table, values)}
 
 
 def refuse_damaged(table: sa.Table, row: Mapping[str, Any]) -> None:
-    """Raise DamagedData where a row fails its checksum."""
+    """Raise DamagedData if a row fails its checksum."""
     if fails(table, row):
         key = ", ".join(f"{column.name} {row[column.name]}" for column in table.primary_key)
         raise DamagedData(f"{table.name} ({key}) is not what was stored")
@@ -68,12 +68,13 @@ def fails(table: sa.Table, row: Mapping[str, Any]) -> bool:
 
 
 def allow_damage(connection: sa.Connection, *, everywhere: bool = False) -> None:
-    """Have this transaction read and replace what fails its checksum and is computed again, or read whatever does."""
+    """Let this transaction read and replace damaged results (rows that fail their checksum), or read any damaged rows
+    if `everywhere`."""
     connection.execution_options(**{_ALLOWED: "everywhere" if everywhere else "in results"})
 
 
 def allows_damage(rows: sa.Result[Any], table: sa.Table) -> bool:
-    """Whether rows of a table were read in such a transaction, and may be damaged."""
+    """Whether these rows of a table were read in such a transaction, and may be damaged."""
     context = getattr(rows, "context", None)
     where = None if context is None else context.execution_options.get(_ALLOWED)
     return where == "everywhere" or (where is not None and table.name in _FOLLOW_FROM_RUNS)
@@ -87,7 +88,8 @@ def amend(
     checked: bool = True,
     **columns: Any,
 ) -> int:
-    """Change columns of rows, each of which may follow from the row as it was; how many there were. Raises DamagedData."""
+    """Change columns of rows, each by a value or a function of the old row; returns the number of rows. Raises
+    DamagedData."""
     found = connection.execute(sa.select(table).where(*this).with_for_update())
     allowed = not checked or allows_damage(found, table)
     rows = [dict(row) for row in found.mappings()]
@@ -101,7 +103,7 @@ def amend(
 
 
 def findings(connection: sa.Connection, table: sa.Table, this: sa.ColumnElement[bool]) -> list[str]:
-    """What of a table fails, a sentence each."""
+    """A sentence for each row of a table that fails its checksum."""
     found = []
     for row in connection.execute(sa.select(table).where(this)).mappings():
         try:

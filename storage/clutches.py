@@ -39,14 +39,14 @@ class ClutchRow:
 
     @property
     def is_disputed(self) -> bool:
-        """Whether data and model are in dispute in the present life."""
+        """Whether data and model disagree in the present life."""
         return self.disputed is not None and self.disputed == self.summary.get("life", "")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClutchSelection:
-    """Which clutches a list shows: in use or archived; of all or of `only` some; in one state; with runs that are held;
-    whose id, friction material or fluid contains `find`, whatever its case."""
+    """The clutches of a list: in use or archived; all or `only` some; in one state; with held runs; with `find` in id,
+    friction material or fluid, ignoring case."""
 
     archived: bool = False
     only: Collection[str] | None = None
@@ -57,14 +57,14 @@ class ClutchSelection:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ByNeed:
-    """An order of clutches, what needs somebody first: those in one of `states`, in their order; then those with an alarm
-    that nobody has acknowledged; then the others; last those whose rank is `over` or more: their lives have ended."""
+    """An order of clutches by urgency: those in one of `states`, in that order; then those with an unacknowledged
+    alarm; then the others; last those with a rank of `over` or more, because their lives have ended."""
 
     states: Sequence[str]
     over: float
 
     def place(self) -> ColumnElement[int]:
-        """Where a clutch comes, 0 first."""
+        """The position of a clutch's group, 0 first."""
         of_state = [(clutch.c.state == name, place) for place, name in enumerate(self.states)]
         count = len(of_state)
         return case((clutch.c.rank >= self.over, count + 2), *of_state, (_with_raised_alarm, count), else_=count + 1)
@@ -72,7 +72,7 @@ class ByNeed:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Counts:
-    """How many clutches a choice holds by state, and how many of them have runs that are held."""
+    """The numbers of chosen clutches by state, and of those with held runs."""
 
     states: dict[str, int]
     held: int
@@ -91,7 +91,7 @@ _number = select(func.count()).select_from(clutch)
 
 
 def insert(connection: Connection, row: ClutchRow) -> None:
-    """Store a new clutch. Raises IntegrityError where its id is taken."""
+    """Store a new clutch. Raises IntegrityError if its id is taken."""
     connection.execute(clutch.insert(), _stored.values(row, searched=_searched(row.clutch_id, row.record)))
 
 
@@ -109,9 +109,9 @@ def page(
     by_need: ByNeed | None = None,
     by_kind: bool = False,
 ) -> list[ClutchRow]:
-    """At most `limit` clutches of a choice by their ids behind the id `after`: none is left out or repeated whatever changes
-    between two pages. `by_need`: those that need somebody first, then the lowest rank; `by_kind`: and those of the same
-    materials and fluid together. The first `left_out` are passed over."""
+    """At most `limit` clutches of a choice by id, after the id `after`; none is skipped or repeated if clutches change
+    between two pages. `by_need`: the most urgent first, then the lowest rank; `by_kind`: the same materials and fluid
+    together. The first `left_out` are skipped."""
     order: list[ColumnElement[Any]] = [clutch.c.clutch_id]
     if by_need is not None:
         order = [*([_kind] if by_kind else []), by_need.place(), *_worst_first]
@@ -127,8 +127,8 @@ def page(
 
 
 def _whole_or_damaged(of: Callable[[Any], ClutchRow], row: Any) -> ClutchRow:
-    """The clutch; where it is damaged, one of that name without record and results, whose summary says so: a list of others
-    must not fail for it."""
+    """The clutch; if its row is damaged, one of that name without record and results, with a summary that says so, so
+    that a list of clutches does not fail."""
     try:
         return of(row)
     except DamagedData as error:
@@ -153,7 +153,8 @@ def counts(connection: Connection, choice: ClutchSelection) -> Counts:
 
 
 def at_rank(connection: Connection, choice: ClutchSelection, share: float, *, below: float) -> ClutchRow | None:
-    """The clutch that this share of a choice is worse than, of those with a rank between 0 and `below`; None without any."""
+    """The clutch at the quantile `share` of a choice ordered worst first, among ranks between 0 and `below`; None if
+    there are none."""
     ranked = (clutch.c.rank > 0, clutch.c.rank < below)
     number: int = connection.execute(_chosen(_number, choice).where(*ranked)).scalar_one()
     ids = _chosen(select(clutch.c.clutch_id), choice).where(*ranked).order_by(*_worst_first)
@@ -162,7 +163,7 @@ def at_rank(connection: Connection, choice: ClutchSelection, share: float, *, be
 
 
 def _chosen(query: Select[Any], choice: ClutchSelection) -> Select[Any]:
-    """A query of a choice's clutches alone."""
+    """The query, restricted to the chosen clutches."""
     query = query.where(clutch.c.archived == int(choice.archived))
     if choice.only is not None:
         query = query.where(among(clutch.c.clutch_id, sorted(choice.only)))
@@ -185,7 +186,7 @@ def set_record(
     registered: Json | None,
     archived: bool,
 ) -> None:
-    """Replace a clutch's record, and whether lists leave it out. Raises LookupError on an unknown clutch."""
+    """Replace a clutch's record, and whether it is archived. Raises LookupError on an unknown clutch."""
     fields = {"record": record, "content_sha256": content_sha256, "registered": registered, "archived": archived}
     _change(connection, clutch_id, _stored.columns(**fields) | {"searched": _searched(clutch_id, record)})
 
@@ -193,21 +194,21 @@ def set_record(
 def set_summary(
     connection: Connection, clutch_id: str, rank: float, summary: Json, *, life: str, state: str, if_disputed: str
 ) -> None:
-    """Replace what lists show of a clutch: `state` is its state's name, or `if_disputed` where `life` is in dispute. Raises
-    LookupError on an unknown one."""
+    """Replace a clutch's summary and rank for lists; its state becomes `state`, or `if_disputed` if data and model
+    disagree in `life`. Raises LookupError on an unknown clutch."""
     state_name = lambda row: if_disputed if row["disputed"] == life else state  # noqa: E731
     _change(connection, clutch_id, {"rank": rank, "summary": to_text(summary), "state": state_name})
 
 
 def set_disputed(connection: Connection, clutch_id: str, disputed: str | None, *, state: str) -> None:
-    """Note of which life data and model are in dispute, None: of none, and the state that follows. Raises LookupError on an
+    """Store the life in which data and model disagree (None: none), and the resulting state. Raises LookupError on an
     unknown clutch."""
     _change(connection, clutch_id, {"disputed": disputed, "state": state})
 
 
 def set_silent(connection: Connection, clutch_id: str, silent: str | None, *, state: str) -> None:
-    """Note since when a clutch's rig has sent nothing, None: it has, and the state that follows. Raises LookupError on an
-    unknown clutch."""
+    """Store since when a clutch's rig has sent nothing (None: it is not silent), and the resulting state. Raises
+    LookupError on an unknown clutch."""
     _change(connection, clutch_id, {"silent": silent, "state": state})
 
 
@@ -232,12 +233,12 @@ def revision(connection: Connection, clutch_id: str) -> int | None:
 
 
 def count(connection: Connection) -> int:
-    """How many clutches there are, archived ones too."""
+    """The number of clutches, including archived ones."""
     return connection.execute(_number).scalar_one()
 
 
 def count_within(connection: Connection, ranks: Sequence[float]) -> dict[float, int]:
-    """How many clutches in use have at most each of these ranks; only those within the greatest are looked at."""
+    """The numbers of clutches in use with at most each of these ranks; only those within the greatest are read."""
     counts = [func.coalesce(func.sum(case((clutch.c.rank <= rank, 1), else_=0)), 0) for rank in ranks]
     row = connection.execute(select(*counts).where(clutch.c.rank <= max(ranks), clutch.c.archived == 0)).one()
     return dict(zip(ranks, row, strict=True))
@@ -253,5 +254,5 @@ def revisions(connection: Connection) -> dict[str, int]:
 
 
 def _searched(clutch_id: str, record: Json) -> str:
-    """What a search looks into. Folded here: of the two databases each would fold other letters."""
+    """The text that a search looks into, with case folded here, because the two databases fold case differently."""
     return "\n".join([clutch_id, record.get("friction_material", ""), record.get("fluid", "")]).casefold()

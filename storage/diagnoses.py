@@ -18,10 +18,10 @@ RUNNING, FINISHED, FAILED = "running", "finished", "failed"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DiagnosisRow:
-    """A diagnosis of the runs up to `last_run_key` (0 where there are none): `report` once it is finished, `problem` where
-    it failed, `extension` where there is one.
+    """A diagnosis of the runs up to `last_run_key` (0: no runs): `report` once it is finished, `problem` if it failed,
+    `extension` if there is one.
 
-    `life` is the run_id of the rebuild with which the diagnosed life began, "" for the first life.
+    `life`: the run_id of the rebuild that began the diagnosed life, "" for the first life.
     """
 
     clutch_id: str
@@ -44,7 +44,7 @@ _rows = Rows(DiagnosisRow, key="diagnosis_key", of=diagnosis)
 
 
 def insert(connection: Connection, row: DiagnosisRow) -> None:
-    """Store a diagnosis that is running. Raises IntegrityError where its clutch is unknown or its id taken."""
+    """Store a running diagnosis. Raises IntegrityError where its clutch is unknown or its id taken."""
     connection.execute(diagnosis.insert(), _rows.values(row))
 
 
@@ -54,15 +54,14 @@ def get(connection: Connection, clutch_id: str, diagnosis_id: str) -> DiagnosisR
 
 
 def page(connection: Connection, clutch_id: str, *, limit: int, before: float | None = None) -> list[DiagnosisRow]:
-    """At most `limit` diagnoses, newest first; `before` is the key of the last diagnosis of the page before."""
+    """At most `limit` diagnoses, newest first; `before` is the key of the previous page's last diagnosis."""
     of_clutch = select(diagnosis).where(diagnosis.c.clutch_id == clutch_id)
     query = newest_first(of_clutch, diagnosis.c.diagnosis_key, before=before, limit=limit)
     return _rows.all(connection.execute(query))
 
 
 def running(connection: Connection, clutch_id: str, last_run_key: int, *, since: int = 0) -> list[str]:
-    """The ids of the diagnoses of the same runs that are running, oldest first; `since` is the revision of their last
-    change."""
+    """The ids of running diagnoses of the same runs, oldest first; `since` is the revision of the runs' last change."""
     query = select(diagnosis.c.diagnosis_id).where(
         diagnosis.c.clutch_id == clutch_id,
         diagnosis.c.status == RUNNING,
@@ -73,12 +72,12 @@ def running(connection: Connection, clutch_id: str, last_run_key: int, *, since:
 
 
 def finish(connection: Connection, diagnosis_id: str, at: str, report: Json, extension: Json | None) -> bool:
-    """Store the report of a running diagnosis; False where it is no longer running."""
+    """Store the report of a running diagnosis; false if it is no longer running."""
     return _end(connection, diagnosis_id, status=FINISHED, finished_at=at, report=report, extension=extension)
 
 
 def fail(connection: Connection, diagnosis_id: str, at: str, problem: str) -> bool:
-    """Store why a running diagnosis has no report; False where it is no longer running."""
+    """Store why a running diagnosis failed; false if it is no longer running."""
     return _end(connection, diagnosis_id, status=FAILED, finished_at=at, problem=problem)
 
 
@@ -88,17 +87,17 @@ def _end(connection: Connection, diagnosis_id: str, **fields: object) -> bool:
 
 
 def last_run_key(connection: Connection, clutch_id: str) -> int:
-    """The key of the clutch's accepted run that was stored last, 0 where there is none."""
+    """The key of the clutch's most recently stored accepted run, 0 if there is none."""
     accepted = (run.c.clutch_id == clutch_id, run.c.state == ACCEPTED)
     return connection.execute(select(func.max(run.c.run_key)).where(*accepted)).scalar() or 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VerdictRow:
-    """A finished diagnosis' verdict, causes and advised tests, the best first; `adoptable` where it has an extended model,
-    `adopted` where the model adopted last came from it.
+    """A finished diagnosis's verdict, causes and advised tests, best first; `adoptable`: it has an extended model;
+    `adopted`: the newest adopted model came from it.
 
-    `life` is the run_id of the rebuild with which the diagnosed life began, "" for the first life.
+    `life`: the run_id of the rebuild that began the diagnosed life, "" for the first life.
     """
 
     diagnosis_id: str
@@ -135,7 +134,7 @@ _verdicts = select(
 
 
 def newest(connection: Connection, clutch_ids: Sequence[str]) -> dict[str, VerdictRow]:
-    """clutch_id -> its newest finished diagnosis, where it has one."""
+    """clutch_id -> its newest finished diagnosis, for clutches that have one."""
     verdicts: dict[str, VerdictRow] = {}
     for row in connection.execute(_verdicts.where(diagnosis.c.clutch_id.in_(clutch_ids))):
         summary = to_object(row.short)

@@ -18,7 +18,7 @@ from sqlalchemy.types import NullType, TypeEngine
 
 
 class _NumberOrNull(sa.TypeDecorator[float]):
-    """A double of PostgreSQL's; NaN is stored as NULL, as SQLite stores it, and refused where there must be a number."""
+    """PostgreSQL's double with NaN stored as NULL, as in SQLite, and refused in a required column."""
 
     impl = sa.Double
     cache_ok = True
@@ -34,7 +34,7 @@ WHOLE = sa.Integer().with_variant(sa.BigInteger(), "postgresql")
 
 
 class DialectPair(FunctionElement[Any]):
-    """An expression as SQLite knows it, and the same as PostgreSQL does."""
+    """An expression in SQLite's dialect and its equivalent in PostgreSQL's."""
 
     inherit_cache = True
 
@@ -54,32 +54,33 @@ def _as_postgresql(pair: DialectPair, compiler: SQLCompiler, **options: Any) -> 
 
 
 def json_value(column: sa.ColumnElement[str], *path: str | int) -> sa.ColumnElement[Any]:
-    """The value at `path` of the JSON in a text column, as Python has it; None where there is none. No list, no object."""
+    """The value at `path` of the JSON in a text column, as a Python value; None if there is none. It must be neither a
+    list nor an object."""
     of_postgresql = sa.cast(column, sa.JSON).op("#>", return_type=NullType())(_array(path))  # the driver decodes it
     return DialectPair(sa.func.json_extract(column, _sqlite_path(path)), of_postgresql)
 
 
 def json_text(column: sa.ColumnElement[str], *path: str | int) -> sa.ColumnElement[str]:
-    """The text at `path` of the JSON in a text column, to be compared; NULL where there is none."""
+    """The text at `path` of the JSON in a text column, for comparison; NULL if there is none."""
     of_postgresql = sa.cast(column, sa.JSON).op("#>>", return_type=sa.Text())(_array(path))
     return DialectPair(sa.func.json_extract(column, _sqlite_path(path)), of_postgresql)
 
 
 def json_fields(column: sa.ColumnElement[str], *names: str) -> sa.ColumnElement[str]:
-    """JSON text with these fields, lists and objects too, of the JSON in a text column; null where it has none."""
+    """JSON text of these fields, lists and objects too, of the JSON in a text column; null for a missing field."""
     of_sqlite = [part for name in names for part in (name, sa.func.json_extract(column, _sqlite_path((name,))))]
     of_postgresql = [part for name in names for part in (name, sa.cast(column, sa.JSON).op("#>")(_array((name,))))]
     return DialectPair(sa.func.json_object(*of_sqlite), sa.cast(sa.func.json_build_object(*of_postgresql), sa.Text))
 
 
 def json_length(column: sa.ColumnElement[str], *path: str) -> sa.ColumnElement[int]:
-    """How many items the list at `path` of the JSON in a text column has; NULL where there is none."""
+    """The length of the list at `path` of the JSON in a text column; NULL if there is none."""
     of_postgresql = sa.func.json_array_length(sa.cast(column, sa.JSON).op("#>")(_array(path)), type_=sa.Integer)
     return DialectPair(sa.func.json_array_length(column, _sqlite_path(path)), of_postgresql)
 
 
 def among(column: sa.ColumnElement[Any], wanted: Sequence[str | int]) -> sa.ColumnElement[bool]:
-    """Whether a column's value is one of these, however many: they are one parameter, JSON text."""
+    """Whether a column's value is one of these; any number of values is one parameter, JSON text."""
     parameter_list = sa.literal(json.dumps(list(wanted), ensure_ascii=False), sa.Text)
     of_sqlite = sa.func.json_each(parameter_list).table_valued("value").c.value
     of_postgresql = sa.func.json_array_elements_text(sa.cast(parameter_list, sa.JSON)).table_valued("value").c.value
@@ -87,7 +88,7 @@ def among(column: sa.ColumnElement[Any], wanted: Sequence[str | int]) -> sa.Colu
 
 
 def now_in_seconds() -> sa.ColumnElement[float]:
-    """Seconds since 1970 by the clock of the database, which is one for all processes that use it."""
+    """Seconds since 1970 by the database's clock, the same for all processes that use it."""
     of_sqlite = (sa.func.julianday("now") - 2440587.5) * 86400.0
     return DialectPair(of_sqlite, sa.cast(sa.func.extract("epoch", sa.func.clock_timestamp()), sa.Double))
 
@@ -95,14 +96,14 @@ def now_in_seconds() -> sa.ColumnElement[float]:
 def newest_first(
     query: sa.Select[Any], key: sa.ColumnElement[int], *, before: float | None, limit: int | None
 ) -> sa.Select[Any]:
-    """At most `limit` rows of a query, the greatest key first; those whose key is less than `before`."""
+    """At most `limit` rows of a query, greatest key first, with keys less than `before`."""
     if before is not None:
         query = query.where(key < sa.literal(before, sa.Double))
     return query.order_by(key.desc()).limit(limit)
 
 
 def upsert(connection: sa.Connection, table: sa.Table, rows: Sequence[dict[str, Any]]) -> None:
-    """Store rows, each in the place of the one with the same primary key."""
+    """Store rows, replacing those with the same primary key."""
     if rows:
         connection.execute(_upsert(table, connection.dialect.name), rows)
 

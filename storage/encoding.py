@@ -60,7 +60,7 @@ _NO_LONGER = 1.02
 
 
 def encode(column: NDArray[np.float64]) -> bytearray:
-    """The column [n] as bytes, to be read back by `decode`. Raises ValueError unless it is one row of 64-bit floats."""
+    """The column [n] as bytes for `decode`. Raises ValueError unless it is one row of 64-bit floats."""
     if column.dtype != np.float64 or column.ndim != 1:
         raise ValueError(f"a column must be one row of float64, got {column.dtype} of shape {column.shape}")
     shuffled = np.ascontiguousarray(column, dtype="<f8").view(np.uint8).reshape(-1, _PLANES).T
@@ -71,7 +71,7 @@ def encode(column: NDArray[np.float64]) -> bytearray:
 
 
 def decode(data: bytes | bytearray, codec: str, length: int) -> NDArray[np.float64]:
-    """The column [length] that `encode` was given. Raises DamagedData where the bytes are not what was stored."""
+    """The column [length] from the bytes of `encode`. Raises DamagedData if the bytes have changed."""
     if codec != CODEC:
         raise DamagedData(f"a column is stored with the codec {codec!r}, this release knows {CODEC!r}")
     body = _unsealed(data, at_least=_PLANE_SIZES.size)
@@ -108,7 +108,7 @@ def pack(arrays: Mapping[str, NDArray[np.float64] | NDArray[np.bool_]]) -> bytes
 
 
 def _flags(array: NDArray[np.float64] | NDArray[np.bool_]) -> NDArray[np.bool_] | None:
-    """An array of nothing but 0 and 1 as booleans, None for another."""
+    """An array of 0 and 1 alone as booleans, None for any other."""
     if array.dtype == np.bool_:
         return array.astype(np.bool_, copy=False)
     flags: NDArray[np.bool_] = array == 1.0
@@ -116,8 +116,8 @@ def _flags(array: NDArray[np.float64] | NDArray[np.bool_]) -> NDArray[np.bool_] 
 
 
 def unpack(data: bytes, *, booleans: bool = False) -> dict[str, NDArray[np.float64] | NDArray[np.bool_]]:
-    """The arrays that `pack` was given; with `booleans` flags as such, an eighth of the memory. Raises DamagedData where the
-    bytes are not what was stored."""
+    """The arrays from the bytes of `pack`; with `booleans` flags are booleans, an eighth of the memory. Raises
+    DamagedData if the bytes have changed."""
     body = _unsealed(data, at_least=_NUMBER.size)
     start = _NUMBER.size + _NUMBER.unpack_from(body)[0]
     try:
@@ -136,7 +136,7 @@ def unpack(data: bytes, *, booleans: bool = False) -> dict[str, NDArray[np.float
 def _unpacked(
     body: memoryview, start: int, shape: list[int], form: list[str]
 ) -> tuple[NDArray[np.float64] | NDArray[np.bool_], int]:
-    """The array from `start` on, and where it ends."""
+    """The array that begins at `start`, and the position of its end."""
     size = math.prod(shape)
     if not form:
         values = np.frombuffer(body, dtype="<f8", count=size, offset=start)
@@ -148,7 +148,7 @@ def _unpacked(
 
 
 def _append_planes(data: bytearray, planes: NDArray[np.uint8]) -> list[int]:
-    """Append planes [k, n] to `data`, deflated where that is worth it; returns the bytes that each plane takes."""
+    """Append planes [k, n] to `data`, deflated if that saves enough; returns the bytes of each plane."""
     sizes = []
     for plane in planes:
         before = len(data)
@@ -158,7 +158,7 @@ def _append_planes(data: bytearray, planes: NDArray[np.uint8]) -> list[int]:
 
 
 def _read_planes(body: memoryview, sizes: Sequence[int], length: int) -> NDArray[np.uint8]:
-    """The planes [k, length] that `_append_planes` wrote, of the given sizes. Raises DamagedData."""
+    """The planes [k, length] from the bytes of `_append_planes`, of the given sizes. Raises DamagedData."""
     planes = np.empty((len(sizes), length), dtype=np.uint8)
     start = 0
     for row, size in zip(planes, sizes, strict=True):
@@ -226,7 +226,7 @@ _STEP_PLANES = 4
 
 
 def encode_decimals(column: NDArray[np.float64]) -> bytearray | None:
-    """A column [n] as bytes, to be read back by `decode_decimals`; None where it does not hold decimals."""
+    """A column [n] as bytes for `decode_decimals`; None if its values are no short decimals."""
     probe = column[:: max(1, column.size // _PROBED)]
     decimals = next((d for d in range(_MAX_DECIMALS + 1) if _whole(probe, d) is not None), None)
     head = None if decimals is None else _whole(column[:1], decimals)
@@ -252,7 +252,8 @@ def encode_decimals(column: NDArray[np.float64]) -> bytearray | None:
 
 
 def _whole(column: NDArray[np.float64], decimals: int) -> NDArray[np.int64] | None:
-    """k [n] of a column that is k / 10^decimals, every bit but the sign of a zero; None where it is not."""
+    """The integers k [n] of a column that equals k / 10^decimals in every bit but the sign of a zero; None if it does
+    not."""
     scale = 10.0**decimals
     with np.errstate(over="ignore", invalid="ignore"):
         scaled = column * scale
@@ -264,7 +265,7 @@ def _whole(column: NDArray[np.float64], decimals: int) -> NDArray[np.int64] | No
 
 
 def decode_decimals(data: bytes | bytearray, length: int) -> NDArray[np.float64]:
-    """The column [length] that `encode_decimals` was given. Raises DamagedData where the bytes are not what was stored."""
+    """The column [length] from the bytes of `encode_decimals`. Raises DamagedData if the bytes have changed."""
     body = _unsealed(data, at_least=_HEAD.size)
     decimals, first, *sizes = _HEAD.unpack_from(body)
     end = sum(sizes) + _HEAD.size
@@ -305,9 +306,9 @@ _CODINGS: dict[Any, _Coding] = {
 
 
 class Rows(Generic[Value]):
-    """The rows that hold the fields of a dataclass, and perhaps other columns beside them; the database gives the `key`.
+    """Conversion between a dataclass and its rows, which may have other columns too; the database assigns the `key`.
 
-    Whole rows `of` a table have their checksum, and are `checked` for it when they are read.
+    Complete rows `of` a table have a checksum, and are `checked` for it when they are read.
     """
 
     def __init__(self, kind: type[Value], *, key: str = "", of: Table | None = None, checked: bool = True) -> None:
@@ -318,19 +319,19 @@ class Rows(Generic[Value]):
         self._coded = {name: coding for name, coding in codings.items() if coding is not None}
 
     def values(self, value: Value, **others: object) -> dict[str, Any]:
-        """The columns of a row but its key, by name; `others` take the place of the value's own, or come beside them."""
+        """A value's columns by name, without its key; `others` replace or complement the value's own."""
         values = self.columns(**{name: getattr(value, name) for name in self.names if name != self._key}) | others
         return values if self._of is None else checksums.sealed(self._of, values)
 
     def columns(self, **fields: object) -> dict[str, Any]:
-        """Some fields as their columns have them."""
+        """Some fields in the form of their columns."""
         for name in self._coded.keys() & fields.keys():
             fields[name] = None if fields[name] is None else self._coded[name][0](fields[name])
         return fields
 
     def reader(self, rows: Result[*tuple[Any, ...]]) -> Callable[[Row[*tuple[Any, ...]]], Value]:
-        """What makes a value of each of these rows: where its fields stand is found once for all. Raises DamagedData, unless
-        damage is allowed: then what cannot be decoded is empty."""
+        """A function that converts these rows to values; the positions of the fields are looked up once. Raises
+        DamagedData; if damage is allowed, a field that cannot be decoded is empty instead."""
         columns = list(rows.keys())
         fields_of = itemgetter(*map(columns.index, self.names))
         table = self._of
@@ -360,6 +361,6 @@ class Rows(Generic[Value]):
 
 
 def _coding(hint: Any) -> _Coding | None:
-    """To what is stored and back; None where a field is stored as it is."""
+    """A field's conversion to its column and back; None if the field is stored unchanged."""
     kinds = get_args(hint) if get_origin(hint) is UnionType else (hint,)
     return next((_CODINGS[plain] for kind in kinds if (plain := get_origin(kind) or kind) in _CODINGS), None)

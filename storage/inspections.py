@@ -19,7 +19,7 @@ from storage.tables import inspection, inspection_photograph, photograph
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class InspectionRow:
-    """An inspection: `cycles` since new, `content` as it was posted and its hash; photographs refer to its key."""
+    """An inspection: `cycles` since new, `content` as posted, and its hash; photographs refer to its key."""
 
     clutch_id: str
     inspection_id: str
@@ -34,8 +34,7 @@ class InspectionRow:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PhotographRow:
-    """What is known of a stored photograph but its content: its hash, media type, length [bytes], and when and from whom
-    the inspection got it."""
+    """A stored photograph without its content: hash, media type, length [bytes], and time and sender of its receipt."""
 
     sha256: str
     media_type: str
@@ -69,7 +68,8 @@ def get(connection: Connection, clutch_id: str, inspection_id: str) -> Inspectio
 def page(
     connection: Connection, clutch_id: str, *, limit: int | None = None, after: tuple[float, str] | None = None
 ) -> list[InspectionRow]:
-    """Inspections of a clutch by cycles, at most `limit`, behind `after`, the (cycles, inspection_id) of another."""
+    """A page of a clutch's inspections by cycles, at most `limit`, after `after`, the (cycles, inspection_id) of
+    another."""
     order = (inspection.c.cycles, inspection.c.inspection_id)
     query = select(inspection).where(inspection.c.clutch_id == clutch_id).order_by(*order).limit(limit)
     if after is not None:
@@ -78,13 +78,13 @@ def page(
 
 
 def set_state(connection: Connection, inspection_key: int, state: str) -> None:
-    """Withdraw an inspection or take that back. Raises LookupError on an unknown one."""
+    """Withdraw or restore an inspection. Raises LookupError on an unknown one."""
     if amend(connection, inspection, [inspection.c.inspection_key == inspection_key], state=state) != 1:
         raise LookupError(f"inspection {inspection_key} is not stored")
 
 
 def photographs(connection: Connection, inspection_keys: Sequence[int]) -> dict[int, list[PhotographRow]]:
-    """inspection_key -> the photographs of those inspections in the order in which they came, without their content."""
+    """inspection_key -> the inspection's photographs in order of arrival, without their content."""
     of_keys: dict[int, list[PhotographRow]] = {key: [] for key in inspection_keys}
     rows = connection.execute(_photographs.where(among(inspection_photograph.c.inspection_key, inspection_keys)))
     of = _shown.reader(rows)
@@ -94,7 +94,7 @@ def photographs(connection: Connection, inspection_keys: Sequence[int]) -> dict[
 
 
 def data(connection: Connection, inspection_key: int, sha256: str) -> bytes | None:
-    """The content of a photograph of that inspection, None where it has no such one."""
+    """The content of a photograph of that inspection, None if it has no such photograph."""
     of_inspection = select(photograph.c.data).join(
         inspection_photograph, inspection_photograph.c.sha256 == photograph.c.sha256
     )
@@ -104,7 +104,7 @@ def data(connection: Connection, inspection_key: int, sha256: str) -> bytes | No
 
 
 def piece(connection: Connection, sha256: str, start: int, size: int) -> bytes:
-    """So many bytes of a photograph from `start` on; no more of it comes into memory."""
+    """This many bytes of a photograph from `start` on; the rest is not read into memory."""
     if connection.dialect.name == "sqlite":  # whose substr would read all of it first
         row: int = connection.execute(select(literal_column("rowid")).where(photograph.c.sha256 == sha256)).scalar_one()
         file: sqlite3.Connection = connection.connection.driver_connection  # type: ignore[assignment]
@@ -116,8 +116,8 @@ def piece(connection: Connection, sha256: str, start: int, size: int) -> bytes:
 
 
 def attach(connection: Connection, inspection_key: int, row: PhotographRow, content: bytes, *, position: int) -> None:
-    """Add a photograph to an inspection; its content is stored where it is not there yet. Raises IntegrityError where the
-    inspection has it already."""
+    """Add a photograph to an inspection; its content is stored unless it is already. Raises IntegrityError if the
+    inspection has the photograph."""
     if connection.execute(select(photograph.c.sha256).where(photograph.c.sha256 == row.sha256)).first() is None:
         stored = {"sha256": row.sha256, "media_type": row.media_type, "bytes": row.bytes, "data": content}
         connection.execute(photograph.insert(), stored)

@@ -24,8 +24,8 @@ DIAGNOSIS, REPLAY, FLEET_REFRESH = "diagnosis", "replay", "fleet_refresh"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JobRow:
-    """A job: `clutch_id` None where it is of no single clutch, `arguments` what its kind needs, `attempts` how often it was
-    begun; the later it was asked for, the greater its key.
+    """A job: `clutch_id` None if it is not about one clutch, `arguments` those of its kind, `attempts` the number of
+    times it was begun; later jobs have greater keys.
     """
 
     job_id: str
@@ -45,13 +45,13 @@ class JobRow:
 
     @property
     def of(self) -> str | None:
-        """What the job is of: a clutch, or the key of a kind of clutches; None: of all."""
+        """The job's subject: a clutch, or the key of a kind of clutches; None: all clutches."""
         return self.clutch_id or self.arguments.get("fleet")
 
 
 @dataclass(frozen=True, slots=True)
 class Hold:
-    """That a job runs, after so many claims and renewals of all: the same as long as its process has not renewed it."""
+    """A running job, with its count of claims and renewals, which stays the same until its process renews it."""
 
     job_id: str
     renewals: int
@@ -71,7 +71,7 @@ _next = (
 
 
 def insert(connection: Connection, row: JobRow) -> None:
-    """Store a job that waits. Raises IntegrityError where its clutch is unknown or its id taken."""
+    """Store a waiting job. Raises IntegrityError where its clutch is unknown or its id taken."""
     connection.execute(job.insert(), _rows.values(row))
 
 
@@ -87,8 +87,8 @@ def page(
     state: str | None = None,
     only: Collection[str] | None = None,
 ) -> list[JobRow]:
-    """At most `limit` jobs, newest first, in that state, of `only` these clutches; `before` is the key of the last job
-    of the page before."""
+    """At most `limit` jobs, newest first, in that state, limited to the clutches `only`; `before`: the key of the
+    previous page's last job."""
     query = newest_first(select(job), job.c.job_key, before=before, limit=limit)
     if state is not None:
         query = query.where(job.c.state == state)
@@ -102,19 +102,19 @@ def count_open(connection: Connection, kind: str) -> int:
 
 
 def open_of(connection: Connection, kind: str) -> list[JobRow]:
-    """The jobs of a kind that wait or run, in the order in which they were asked for."""
+    """The waiting and running jobs of a kind, oldest first."""
     query = select(job).where(OPEN_ONLY, job.c.kind == kind).order_by(job.c.job_key)
     return _rows.all(connection.execute(query))
 
 
 def holds(connection: Connection, kinds: Collection[str]) -> list[Hold]:
-    """The holds of the jobs of these kinds that run."""
+    """The holds of the running jobs of these kinds."""
     query = select(job.c.job_id, job.c.renewals).where(OPEN_ONLY, job.c.kind.in_(kinds), job.c.state == RUNNING)
     return [Hold(*row) for row in connection.execute(query)]
 
 
 def _free(kinds: Collection[str], abandoned: Collection[Hold]) -> ColumnElement[bool]:
-    """Whether a job of these kinds waits, or is held no other than by one of these."""
+    """The condition that a job of these kinds waits, or is held by one of these expired holds."""
     held = [and_(job.c.job_id == hold.job_id, job.c.renewals == hold.renewals) for hold in abandoned]
     return and_(OPEN_ONLY, job.c.kind.in_(kinds), or_(job.c.state == WAITING, *held))
 
@@ -126,7 +126,7 @@ def any_free(connection: Connection, kinds: Collection[str], abandoned: Collecti
 def claim(
     connection: Connection, claimer: str, kinds: Collection[str], *, at: str, abandoned: Collection[Hold] = ()
 ) -> JobRow | None:
-    """The job of these kinds whose turn it is, the claimer's from now on; None where none is free."""
+    """Claim the next free job of these kinds for the claimer; None if none is free."""
     job_id: str | None = connection.execute(_next.where(_free(kinds, abandoned))).scalar()
     if job_id is None:
         return None
@@ -141,19 +141,19 @@ def _claimed(job_id: str, claimer: str) -> ColumnElement[bool]:
 
 
 def renew(connection: Connection, job_id: str, claimer: str, *, progress: Json | None) -> bool:
-    """Go on to hold the job; False where it is no longer the claimer's: cancelled, or claimed by another."""
+    """Renew the claimer's hold on the job; false if the job was cancelled or claimed by another."""
     held = {"renewals": job.c.renewals + 1} | _rows.columns(progress=progress)
     return connection.execute(update(job).where(_claimed(job_id, claimer)).values(held)).rowcount == 1
 
 
 def release(connection: Connection, job_id: str, claimer: str) -> None:
-    """Give the claimer's job back; that it was begun does not count."""
+    """Return the claimer's job to the queue; the attempt does not count."""
     waiting = {"state": WAITING, "attempts": job.c.attempts - 1, "claimed_by": None}
     connection.execute(update(job).where(_claimed(job_id, claimer)).values(waiting))
 
 
 def release_all(connection: Connection) -> None:
-    """Let all jobs wait: no process runs that could hold one."""
+    """Return all running jobs to the queue, because no process runs that could hold one."""
     connection.execute(update(job).where(job.c.state == RUNNING).values(state=WAITING, claimed_by=None))
 
 
@@ -171,9 +171,9 @@ def end(
     claimer: str | None = None,
     progress: Json | None = None,
 ) -> bool:
-    """Store how a job ended; False where it has ended already or, where a `claimer` is named, is not its.
+    """Store how a job ended; false if it has ended already or, if a `claimer` is named, is held by another.
 
-    `progress` None: how far it had come stays as it is stored.
+    `progress` None: the stored progress stays.
     """
     ended: dict[str, object] = {"state": state, "finished_at": at, "problem": problem}
     if progress is not None:

@@ -37,12 +37,12 @@ def insert(connection: Connection, row: KeyRow) -> None:
 
 
 def any_ever(connection: Connection) -> bool:
-    """Whether a key was ever made: from then on one is always needed."""
+    """Whether a key was ever created; from then on every request needs one."""
     return bool(connection.execute(select(exists(select(access_key.c.key_id)))).scalar_one())
 
 
 def any_active(connection: Connection, at: str) -> bool:
-    """Whether any key grants something at that time."""
+    """Whether any key is valid at that time."""
     unexpired = or_(access_key.c.expires_at.is_(None), access_key.c.expires_at > at)
     return bool(connection.execute(select(exists().where(_active, unexpired))).scalar_one())
 
@@ -53,7 +53,7 @@ def all_keys(connection: Connection) -> list[KeyRow]:
 
 
 def revoke(connection: Connection, key_id: str, revoked_at: str) -> bool:
-    """Revoke a key; False where there is no active key of this id."""
+    """Revoke a key; false if there is no active key of this id."""
     of_key = update(access_key).where(access_key.c.key_id == key_id, _active)
     return connection.execute(of_key.values(revoked_at=revoked_at)).rowcount == 1
 

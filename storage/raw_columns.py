@@ -44,8 +44,8 @@ _columns = select(
 
 @dataclass(frozen=True, slots=True)
 class Encoded:
-    """The channels of one run as they are stored, order kept: name, codec, length and bytes of each; and by name the blobs
-    of those that were put into a store, whose bytes are empty here."""
+    """The encoded channels of one run in order: name, codec, length and bytes of each; and by name the blobs of
+    channels put into a store, whose bytes are empty here."""
 
     columns: tuple[tuple[str, str, int, bytearray], ...]
     store: RawStore | None = None
@@ -53,7 +53,7 @@ class Encoded:
 
     @property
     def is_long(self) -> bool:
-        """Whether a column would go to a store where one is in use."""
+        """Whether a column is long enough for a store of raw records."""
         return any(len(data) > MAX_INLINE for *_, data in self.columns)
 
     def put(self, store: RawStore) -> "Encoded":
@@ -69,7 +69,7 @@ class Encoded:
 
 @dataclass(frozen=True, slots=True)
 class PackedFile:
-    """A file as it is stored, with the hash and the length [bytes] of what was sent."""
+    """A file in its stored form, with the hash and length [bytes] of the original."""
 
     sha256: str
     length: int
@@ -93,7 +93,7 @@ def packed(path: Path) -> PackedFile:
 
 
 def encoded(channels: Mapping[str, NDArray[np.float64]], file: PackedFile | None = None) -> Encoded:
-    """The channels [n] of a run encoded, and its file. Slow for long records; needs no connection."""
+    """The channels [n] of a run, and its file, encoded. Slow for long records; needs no connection."""
     columns = tuple((name, *_encoded(column)) for name, column in channels.items())
     return Encoded(columns if file is None else (*columns, (FILE, file.codec, file.length, file.data)))
 
@@ -106,8 +106,8 @@ def _encoded(column: NDArray[np.float64]) -> tuple[str, int, bytearray]:
 
 
 def write(connection: Connection, run_key: int, channels: Encoded) -> None:
-    """Store the channels of a run. Raises IntegrityError where the run has them already, DatabaseBusy where a blob of it,
-    put meanwhile, may have been removed with what nothing named: it is to be put again."""
+    """Store the channels of a run. Raises IntegrityError where the run has them already, DatabaseBusy where a blob of
+    it, put meanwhile, may have been removed with what nothing named: it is to be put again."""
     store, blobs = channels.store, channels.blobs or {}
     if store is not None:
         _refuse_removed(connection, store, blobs.values())
@@ -129,15 +129,15 @@ def write(connection: Connection, run_key: int, channels: Encoded) -> None:
 
 
 def rewrite(connection: Connection, run_key: int, channels: Encoded) -> None:
-    """Store channels in the place of those that the run has; its file stays. Raises DatabaseBusy as `write` does."""
+    """Replace a run's channels; its file stays. Raises DatabaseBusy as `write` does."""
     connection.execute(delete(channel).where(channel.c.run_key == run_key, channel.c.name != FILE))
     write(connection, run_key, channels)
 
 
 @dataclass(frozen=True, slots=True)
 class Stored:
-    """One channel of a run as it is stored, to be fetched and decoded when no transaction is open any more: its bytes, or
-    the name of its blob and the address of the blob's store."""
+    """One stored channel of a run, to be read and decoded after the transaction: its bytes, or the name of its blob and
+    its store's address."""
 
     run_key: int
     name: str
@@ -148,7 +148,7 @@ class Stored:
     address: str | None = None
 
     def encoded(self) -> bytes:
-        """The bytes, fetched where they lie in a store. Raises as `values` does."""
+        """The encoded bytes, read from the store if they are there. Raises as `values` does."""
         if self.blob is None or self.address is None:
             return self.data
         return fetched(open_store(self.address), self.blob)
@@ -158,14 +158,14 @@ class Stored:
         return replace(self, data=self.encoded(), blob=None, address=None)
 
     def require_whole(self) -> None:
-        """Decode it and keep nothing. Raises as `values` does."""
+        """Decode the channel to check it, and keep nothing. Raises as `values` does."""
         if self.name == FILE:
             self.copy_to(None)
         else:
             self.values()
 
     def copy_to(self, target: BinaryIO | None) -> str:
-        """Write the file as it was sent, block by block, to an open one; its sha256. Raises as `values` does."""
+        """Write the original file, block by block, to an open file; returns its sha256. Raises as `values` does."""
         data, digest, length = memoryview(self.encoded()), hashlib.sha256(), 0
         inflating = zlib.decompressobj() if self.codec == _DEFLATED else None
         try:
@@ -184,7 +184,7 @@ class Stored:
         return digest.hexdigest()
 
     def values(self) -> NDArray[np.float64]:
-        """The channel [length]. Raises DamagedData, and RawStoreUnavailable where the store cannot be reached."""
+        """The decoded channel [length]. Raises DamagedData, and RawStoreUnavailable if the store cannot be reached."""
         try:
             data = self.encoded()
             if self.codec == DECIMAL_CODEC:
@@ -195,18 +195,18 @@ class Stored:
 
 
 def stored_of_run(connection: Connection, run_key: int) -> list[Stored]:
-    """The channels of a run in the order they were sent, not fetched and not decoded; none for a run without."""
+    """The channels of a run in the order sent, not yet read or decoded; empty for a run without channels."""
     of_run = _columns.where(channel.c.run_key == run_key, channel.c.name != FILE).order_by(channel.c.position)
     return [Stored(run_key, **row._asdict()) for row in connection.execute(of_run)]
 
 
 def file_of(connection: Connection, run_key: int) -> Stored | None:
-    """The file that a run was read from, not fetched and not unpacked; None for a run that was sent otherwise."""
+    """The file from which a run was read, not yet unpacked; None for a run sent in another way."""
     return _named(connection, run_key, FILE)
 
 
 def stored(connection: Connection, run_key: int, name: str) -> Stored:
-    """One channel of a run likewise. Raises LookupError where the run has no such channel."""
+    """One channel of a run, not yet read or decoded. Raises LookupError if the run has no such channel."""
     found = _named(connection, run_key, name)
     if found is None:
         raise LookupError(f"run {run_key} has no channel {name}")
@@ -221,7 +221,7 @@ def _named(connection: Connection, run_key: int, name: str) -> Stored | None:
 def stored_elsewhere(
     connection: Connection, store: RawStore | None, *, after: tuple[int, str], most: int
 ) -> list[tuple[int, str]]:
-    """(run_key, name) of channels that a move to `store` (None: to the database) is still to take there, in order, behind
+    """(run_key, name) of channels that a move to `store` (None: to the database) has yet to move, in order, after
     `after`: those in other stores and, for a store, long ones in the database."""
     condition: ColumnElement[bool] = channel.c.blob.is_not(None)
     if store is not None:
@@ -233,9 +233,9 @@ def stored_elsewhere(
 
 
 def move(connection: Connection, column: Stored, data: bytes, store: RawStore | None) -> None:
-    """Have a channel's bytes, which are in the store already, looked for there; where it is None they are written here.
+    """Move a channel to a store that already has its bytes; `store` None: write its bytes into the database.
 
-    Raises DatabaseBusy where the blob may have been removed meanwhile with what nothing named: it is to be put again.
+    Raises DatabaseBusy if a clean-up may have removed the blob meanwhile: then put it again.
     """
     place: dict[str, Any] = {"data": data, "blob": None, "store_key": None}
     if store is not None:
@@ -258,14 +258,14 @@ def values_of(columns: Sequence[Stored]) -> dict[str, NDArray[np.float64]]:
 
 
 def lengths(connection: Connection, run_key: int) -> dict[str, int]:
-    """How many values each channel of a run has, in the order they were sent; no values are read."""
+    """The number of values of each channel of a run, in the order sent; no values are read."""
     query = select(channel.c.name, channel.c.length).where(channel.c.run_key == run_key, channel.c.name != FILE)
     rows = connection.execute(query.order_by(channel.c.position))
     return {name: length for name, length in rows}  # noqa: C416  (rows are no pairs to mypy)
 
 
 def samples(connection: Connection, clutch_id: str) -> dict[int, int]:
-    """run_key -> how many samples its record has, of the runs of a clutch that are sampled records."""
+    """run_key -> number of samples, for a clutch's runs that are sampled records."""
     query = select(channel.c.run_key, channel.c.length).join(run, run.c.run_key == channel.c.run_key)
     rows = connection.execute(query.where(run.c.clutch_id == clutch_id, channel.c.name == "time_s"))
     return {run_key: length for run_key, length in rows}  # noqa: C416  (rows are no pairs to mypy)

@@ -60,7 +60,7 @@ _fits = Rows(FitRow, of=fit)
 
 
 def write_fits(connection: Connection, run_key: int, rows: Sequence[FitRow]) -> None:
-    """Store the fits of a run in place of those it had. Raises ValueError unless a covariance has 16 finite numbers."""
+    """Replace the fits of a run. Raises ValueError unless each covariance has 16 finite numbers."""
     connection.execute(delete(fit).where(fit.c.run_key == run_key))
     if rows:
         connection.execute(fit.insert(), [_fit_values(run_key, row) for row in rows])
@@ -85,8 +85,8 @@ def fits_of_run(connection: Connection, run_key: int) -> list[FitRow]:
 
 
 def cofs_of(connection: Connection, clutch_id: str, beyond: int = 0) -> dict[int, dict[float, tuple[float, float]]]:
-    """run_key -> pressure -> mean COF and its deviation, of all curves that determine it: as much as tracking needs. Of runs
-    with keys `beyond` that one. Raises DamagedData."""
+    """run_key -> pressure -> mean COF and its standard deviation, for all curves that determine it, of runs with keys
+    `beyond` that one. Raises DamagedData."""
     cofs: dict[int, dict[float, tuple[float, float]]] = {}
     query = (
         select(fit)
@@ -129,14 +129,14 @@ _predictions = Rows(PredictionRow, of=prediction)
 
 
 def put_predictions(connection: Connection, clutch_id: str, rows: Sequence[PredictionRow]) -> None:
-    """Store predictions, each in place of the one of the same method, pressure and cycles."""
+    """Store predictions, replacing those of the same method, pressure and cycles."""
     upsert(connection, prediction, [_predictions.values(row, clutch_id=clutch_id) for row in rows])
 
 
 def prediction_at(
     connection: Connection, clutch_id: str, method: str, pressure: float, at_cycles: float | None = None
 ) -> PredictionRow | None:
-    """The last prediction of a series, or the last one not beyond `at_cycles`; None where there is none."""
+    """The last prediction of a series up to `at_cycles` (None: of all); None if there is none."""
     query = _series(clutch_id, method, pressure).order_by(prediction.c.cycles.desc()).limit(1)
     if at_cycles is not None:
         query = query.where(prediction.c.cycles <= at_cycles)
@@ -175,7 +175,7 @@ _states = Rows(FilterStateRow, of=filter_state)
 
 
 def put_filter_states(connection: Connection, clutch_id: str, rows: Sequence[FilterStateRow]) -> None:
-    """Store states, each in place of the one of the same method and pressure."""
+    """Store filter states, replacing those of the same method and pressure."""
     upsert(connection, filter_state, [_states.values(row, clutch_id=clutch_id) for row in rows])
 
 

@@ -15,7 +15,7 @@ MAX_AT_ONCE = 50
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RigRow:
-    """A profile in force: `content` as it was posted with its defaults, `version` from 1 on, and who saved it when."""
+    """A profile in force: `content` as posted, with its defaults, `version` from 1 on, and its author and time."""
 
     name: str
     version: int
@@ -41,12 +41,12 @@ def get(connection: Connection, name: str) -> RigRow | None:
 
 
 def page(connection: Connection, *, limit: int = MAX_AT_ONCE, after: str = "") -> list[RigRow]:
-    """Profiles by name, at most `limit`, behind the name `after`."""
+    """A page of profiles by name, at most `limit`, after the name `after`."""
     return _rows.all(connection.execute(select(rig).where(rig.c.name > after).order_by(rig.c.name).limit(limit)))
 
 
 def every(connection: Connection) -> Iterator[RigRow]:
-    """All profiles by name, a page of them in memory."""
+    """All profiles by name, read page by page."""
     rows = page(connection)
     while rows:
         yield from rows

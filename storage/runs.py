@@ -43,7 +43,7 @@ class RunRow:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReceiptRow:
-    """What a list shows of a run; `receipt` and `doubts` as JSON text, as they are stored."""
+    """The fields of a run that lists show; `receipt` and `doubts` as stored JSON text."""
 
     run_id: str
     cycles: float
@@ -120,7 +120,7 @@ def get(connection: Connection, clutch_id: str, run_id: str) -> RunRow | None:
 
 
 def read_again_as(connection: Connection, clutch_id: str, content_sha256: str) -> RunRow | None:
-    """The run whose file was read again since it was sent, with that content; or None."""
+    """The run whose file was read again with this content, else None."""
     content = json_text(run.c.details, "file", "content_sha256") == content_sha256
     return _stored.first(connection.execute(select(run).where(run.c.clutch_id == clutch_id, content)))
 
@@ -135,7 +135,7 @@ def page(
     state: str | None = None,
     fitted: bool = False,
 ) -> list[RunRow]:
-    """Runs of a clutch in order, at most `limit`, behind `after`, the (cycles, run_id) of another.
+    """A page of a clutch's runs in order, at most `limit`, after `after`, the (cycles, run_id) of another.
 
     Of one kind or all, in one state or any; `fitted`: only runs through which a curve was fitted.
     """
@@ -154,7 +154,7 @@ def receipts(
     state: str | None = None,
     kind: str | None = None,
 ) -> list[ReceiptRow]:
-    """Receipts with only the fields that a list shows."""
+    """Receipts, with only the fields that lists show."""
     shown = select(*(run.c[name] for name in _listed.names))
     return _listed.all(connection.execute(_chosen(shown, clutch_id, after, kind, state).limit(limit)))
 
@@ -178,7 +178,7 @@ def in_order(connection: Connection, clutch_id: str) -> list[RunInOrder]:
 
 
 def newest_fitted(connection: Connection, clutch_id: str, kind: str) -> int | None:
-    """The key of the last accepted run of a kind, in order, that has fits; None without any."""
+    """The key of the last accepted run of a kind, in order, with fits; None if there is none."""
     query = _chosen(select(run.c.run_key), clutch_id, None, kind, ACCEPTED).order_by(None)
     query = query.where(exists().where(fit.c.run_key == run.c.run_key))
     key: int | None = connection.execute(query.order_by(*(column.desc() for column in _ORDER)).limit(1)).scalar()
@@ -191,13 +191,13 @@ def in_history(connection: Connection, clutch_id: str) -> list[RunInOrder]:
 
 
 def after_key(connection: Connection, clutch_id: str, run_key: int) -> list[RunInOrder]:
-    """The runs of a clutch that arrived after the one with that key, in order, whatever their state."""
+    """The runs of a clutch with keys greater than that one, in order, in any state."""
     return _in_order(connection, clutch_id, run.c.run_key > run_key)
 
 
 def refuse_damaged(connection: Connection, clutch_id: str, beyond: int = 0) -> None:
-    """Raise DamagedData where a run of a clutch with a key `beyond` that one fails its checksum, whatever its state: what is
-    read of it in part is not checked."""
+    """Raise DamagedData if any run of a clutch with a key `beyond` that one fails its checksum, in any state. Queries
+    of some columns cannot check it."""
     rows = connection.execute(_whole(clutch_id, beyond))
     if not checksums.allows_damage(rows, run):
         for row in rows.mappings():
@@ -215,7 +215,7 @@ def _whole(clutch_id: str, beyond: int) -> Select[Any]:
 
 
 def last_key(connection: Connection, clutch_id: str) -> int:
-    """The greatest key of a clutch's runs, 0 without any."""
+    """The greatest key of a clutch's runs, 0 if it has none."""
     newest = select(func.coalesce(func.max(run.c.run_key), 0)).where(run.c.clutch_id == clutch_id)
     return int(connection.execute(newest).scalar_one())
 
@@ -226,7 +226,7 @@ def rebuilds(connection: Connection, clutch_id: str) -> list[RunInOrder]:
 
 
 def set_aside(connection: Connection, clutch_id: str) -> list[RunInOrder]:
-    """The runs of a clutch that are held or were withdrawn, in order."""
+    """The held and withdrawn runs of a clutch, in order."""
     return _in_order(connection, clutch_id, run.c.state != ACCEPTED)
 
 
@@ -236,7 +236,7 @@ def _in_order(connection: Connection, clutch_id: str, chosen: ColumnElement[bool
 
 
 def held(connection: Connection, clutch_ids: Sequence[str]) -> dict[str, int]:
-    """clutch_id -> the number of its runs that are held, for those of these clutches that have any."""
+    """clutch_id -> number of held runs, for those of these clutches that have any."""
     rows = connection.execute(_held.where(run.c.clutch_id.in_(clutch_ids)))
     return {clutch_id: int(count) for clutch_id, count in rows}
 
@@ -257,7 +257,7 @@ def keys(connection: Connection, clutch_id: str) -> dict[str, int]:
 
 
 def set_results(connection: Connection, run_key: int, details: Json, receipt: Json, code_version: str) -> None:
-    """Replace a run's details and receipt, as a recomputation does. Raises LookupError on an unknown run."""
+    """Replace a run's details and receipt after a recomputation. Raises LookupError on an unknown run."""
     _change(connection, run_key, details=details, receipt=receipt, code_version=code_version)
 
 
@@ -269,7 +269,7 @@ def set_receipt(connection: Connection, run_key: int, receipt: Json) -> None:
 def set_state(
     connection: Connection, run_key: int, *, state: str, cycles: float, sent_cycles: float | None, doubts: Sequence[Any]
 ) -> None:
-    """Change whether a run counts, and at which cycles. Raises LookupError on an unknown run."""
+    """Change a run's state, cycles and doubts. Raises LookupError on an unknown run."""
     _change(connection, run_key, state=state, cycles=cycles, sent_cycles=sent_cycles, doubts=doubts)
 
 

@@ -15,7 +15,7 @@ metadata = MetaData()
 
 
 def _required(kind: type[TypeEngine[Any]] | TypeEngine[Any], *names: str) -> list[Column[Any]]:
-    """Columns that always have a value."""
+    """Columns that must have a value."""
     return [Column(name, kind, nullable=False) for name in names]
 
 
@@ -29,7 +29,7 @@ CHECKSUM = "checksum"
 
 
 def _checksum() -> Column[Any]:
-    """Of all other columns of a row (`storage.checksums`)."""
+    """A column for the checksum of all other columns of a row (`storage.checksums`)."""
     return Column(CHECKSUM, WHOLE, nullable=False, server_default=text("0"))
 
 

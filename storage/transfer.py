@@ -28,7 +28,7 @@ _ROWS, _BINARY_ROWS = 500, 4
 
 
 def rows_of(connection: Connection, table: Table, after: tuple[Any, ...] | None = None) -> Iterator[Row[Any]]:
-    """The rows of a table in the order of their keys, those after a key only; a few are in memory at once."""
+    """The rows of a table in order of their keys, after `after` if given; few are in memory at once."""
     keys = list(table.primary_key)
     statement = select(table).order_by(*keys)
     if after is not None:
@@ -39,7 +39,7 @@ def rows_of(connection: Connection, table: Table, after: tuple[Any, ...] | None 
 
 
 def digest(connection: Connection, table: Table) -> tuple[int, str]:
-    """How many rows a table has, and the sha256 of them all."""
+    """The number of rows of a table, and the sha256 of all of them."""
     hashed, count = hashlib.sha256(), 0
     for row in rows_of(connection, table):
         count += 1
@@ -50,7 +50,7 @@ def digest(connection: Connection, table: Table) -> tuple[int, str]:
 
 
 def _parts(value: Any) -> tuple[bytes, ...]:
-    """A value as bytes that no other value has, with its kind and length before it."""
+    """A value as unique bytes: its kind, its length, then its content."""
     if value is None:
         return (b"-",)
     if isinstance(value, float):
@@ -72,7 +72,7 @@ Advance = Callable[[str, int], object]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Transfer:
-    """A source that is being read, and the target that is being filled. Made by `transfer`."""
+    """A copy from a source database, being read, to a target, being filled. Made by `transfer`."""
 
     source: Connection
     target: Database
@@ -81,7 +81,7 @@ class Transfer:
         return sum(_count(self.source, table) for table in metadata.sorted_tables)
 
     def copy(self, advance: Advance = lambda *_: None) -> None:
-        """Bring over what the target lacks. `advance` hears of rows that are there already, too."""
+        """Copy the rows that the target lacks. `advance` is also called for rows already there."""
         for table in metadata.sorted_tables:
             with self.target.reading() as connection:
                 last, count = _last_key(connection, table), _count(connection, table)
@@ -92,7 +92,7 @@ class Transfer:
                 advance(table.name, len(batch))
 
     def differing(self, advance: Advance = lambda *_: None) -> list[str]:
-        """The tables whose content is not the same on both sides, in words; none where all is."""
+        """A sentence for each table that differs between the two sides; empty if they are equal."""
         differences = []
         for table in metadata.sorted_tables:
             with self.target.reading() as connection:
@@ -105,7 +105,7 @@ class Transfer:
         return differences
 
     def release(self) -> None:
-        """The target is complete: keys go on after the last one, and services may use it."""
+        """Mark the target as complete: keys continue after the last one, and services may use it."""
         with self.target.writing() as connection:
             if connection.dialect.name == "postgresql":
                 for table in metadata.sorted_tables:
@@ -172,7 +172,7 @@ def _batches(table: Table, rows: Iterator[Any]) -> Iterator[list[dict[str, Any]]
 
 
 def _continue_keys(connection: Connection, table: Table) -> None:
-    """Have a sequence go on after the last key that came with the rows."""
+    """Have a key sequence continue after the greatest copied key."""
     column = table.autoincrement_column
     if column is None:
         return

@@ -17,7 +17,7 @@ WAITING, DELIVERED, FAILED = "waiting", "delivered", "failed"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WebhookRow:
-    """A receiver: its `address`, which may hold a password, the `secret` that signs, and what else was posted."""
+    """A receiver: its `address`, which may hold a password, the `secret` for signatures, and the other posted fields."""
 
     webhook_id: str
     address: str
@@ -29,8 +29,8 @@ class WebhookRow:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DeliveryRow:
-    """What a receiver is to be sent, of an alarm or (None) as a test: the bytes of the body, as text. `status` and `problem`
-    are of the last attempt, `due` says when the next was planned, in seconds since 1970: nothing waits for that.
+    """A delivery to a receiver, of an alarm or (None) a test: the body's bytes as text. `status` and `problem` are
+    those of the last attempt; `due`: the planned time of the next [s since 1970], for information only.
     """
 
     delivery_id: str
@@ -57,7 +57,7 @@ _oldest_of_each = select(func.min(delivery.c.delivery_key)).where(WAITING_ONLY).
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WaitingRow:
-    """What waits in the outbox: how often it was tried, and when the last attempt ended."""
+    """A waiting delivery: the number of attempts, and when the last one ended."""
 
     delivery_key: int
     webhook_id: str
@@ -78,19 +78,19 @@ def get(connection: Connection, webhook_id: str) -> WebhookRow | None:
 
 
 def page(connection: Connection, *, limit: int | None = None, after: str = "") -> list[WebhookRow]:
-    """Receivers by name, behind the name `after`."""
+    """A page of receivers by name, after the name `after`."""
     query = select(webhook).where(webhook.c.webhook_id > after).order_by(webhook.c.webhook_id).limit(limit)
     return _receivers.all(connection.execute(query))
 
 
 def remove(connection: Connection, webhook_id: str) -> None:
-    """Delete a receiver with its secret, and all that was sent or is to be sent to it."""
+    """Delete a receiver, its secret and all its deliveries."""
     connection.execute(delete(delivery).where(delivery.c.webhook_id == webhook_id))
     connection.execute(delete(webhook).where(webhook.c.webhook_id == webhook_id))
 
 
 def insert_delivery(connection: Connection, row: DeliveryRow) -> None:
-    """Put what is to be sent into the outbox, due at once."""
+    """Put a delivery into the outbox, due at once."""
     connection.execute(delivery.insert(), _deliveries.values(row))
 
 
@@ -101,20 +101,21 @@ def find_delivery(connection: Connection, delivery_id: str) -> DeliveryRow | Non
 def deliveries(
     connection: Connection, webhook_id: str, *, limit: int, before: float | None = None
 ) -> list[DeliveryRow]:
-    """What was sent or is to be sent to a receiver, newest first; `before` is the key of the last of the page before."""
+    """A receiver's deliveries, sent or waiting, newest first; `before`: the key of the previous page's last delivery."""
     of_receiver = select(delivery).where(delivery.c.webhook_id == webhook_id)
     query = newest_first(of_receiver, delivery.c.delivery_key, before=before, limit=limit)
     return _deliveries.all(connection.execute(query))
 
 
 def next_ones(connection: Connection) -> list[WaitingRow]:
-    """Of each receiver and alarm the oldest delivery that waits, oldest first."""
+    """The oldest waiting delivery of each receiver and alarm, oldest first."""
     query = select(*(delivery.c[name] for name in _waiting.names)).where(delivery.c.delivery_key.in_(_oldest_of_each))
     return _waiting.all(connection.execute(query.order_by(delivery.c.delivery_key)))
 
 
 def claim(connection: Connection, row: WaitingRow) -> DeliveryRow | None:
-    """Count an attempt, which the caller makes; None where another has done so since, or it waits no longer."""
+    """Count an attempt, to be made by the caller; None if another process counted one since, or the delivery no longer
+    waits."""
     this = (delivery.c.delivery_key == row.delivery_key, WAITING_ONLY, delivery.c.attempts == row.attempts)
     if connection.execute(update(delivery).where(*this).values(attempts=row.attempts + 1)).rowcount != 1:
         return None
@@ -131,7 +132,7 @@ def end(
     problem: str | None,
     pause: float = 0.0,
 ) -> None:
-    """Store how an attempt ended: delivered, given up, or (`waiting`) to be tried again, as planned after `pause` [s]."""
+    """Store an attempt's result: delivered, given up, or (`waiting`) to be repeated after `pause` [s]."""
     ended = {"state": state, "last_attempt_at": at, "status": status, "problem": problem}
     delivered = {"delivered_at": at if state == DELIVERED else None, "due": now_in_seconds() + pause}
     this = update(delivery).where(delivery.c.delivery_key == delivery_key, WAITING_ONLY)

@@ -36,7 +36,7 @@ PYTHON = (sys.executable, "-P")
 
 
 def require_address(url: str, *, private: bool) -> None:
-    """Raise InvalidError where a receiver cannot have this address: it is none, or one that may not be asked."""
+    """Raise InvalidError if a receiver cannot have this address, because it is no valid address or may not be called."""
     scheme = receivers.scheme_of(url)
     if scheme not in _WEB:
         _require_apprise(url, scheme)
@@ -79,7 +79,8 @@ def send(url: str, body: bytes, *, secret: str, delivery_id: str, private: bool)
 
 
 def _exchange(task: Mapping[str, object]) -> Mapping[str, Any]:
-    """What the process of its own answers: a message is sent where the task has one, else the address is looked at."""
+    """The answer of a separate process that sends the task's message through Apprise; without a message it only checks
+    the address."""
     command = [*PYTHON, "-m", "service.alarms.notify"]
     try:
         done = subprocess.run(  # noqa: S603  (our own module)
@@ -97,7 +98,8 @@ def _exchange(task: Mapping[str, object]) -> Mapping[str, Any]:
 
 
 def confine(private: bool) -> None:
-    """Have this process refuse what a sender has no need of, until it ends."""
+    """Forbid this process, until it ends, every operation that sending does not need: other connections, files and
+    commands."""
     places = tuple({sys.prefix, sys.base_prefix, *(path for path in sys.path if path)}) + _SYSTEM_FILES
 
     def watch(event: str, arguments: tuple[Any, ...]) -> None:
@@ -127,7 +129,7 @@ def _require_connectable(address: Any, *, private: bool) -> None:
 
 
 def main() -> None:
-    """Do what standard input says, and answer."""
+    """Check the address of the task on standard input, send its message if it has one, and write the answer."""
     import apprise  # an extra, and of this process alone
 
     task = json.load(sys.stdin)

@@ -44,7 +44,7 @@ _log = logging.getLogger("clutchlife")
 
 
 class Outbox:
-    """The thread that delivers. `start` it once the database is open, `close` it before that is closed."""
+    """The thread that sends deliveries. `start` it once the database is open, `close` it before the database closes."""
 
     def __init__(self, database: Database, settings: Settings) -> None:
         self._database = database
@@ -68,7 +68,7 @@ class Outbox:
         self._thread.start()
 
     def close(self) -> None:
-        """Stop; attempts that have begun end within seconds, and what they do not store is tried again."""
+        """Stop the thread; running attempts end within seconds, and those not stored are repeated at the next start."""
         with self._change:
             self._closing = True
             self._change.notify_all()
@@ -77,7 +77,7 @@ class Outbox:
         self._pool.shutdown(wait=True, cancel_futures=True)
 
     def wake(self) -> None:
-        """Look now for what is to be sent."""
+        """Look for deliveries to send now."""
         with self._change:
             self._woken = True
             self._change.notify_all()
@@ -123,8 +123,8 @@ class Outbox:
                 self._pool.submit(self._attempt, row, receiver, private=private)
 
     def _due(self, waiting: Sequence[WaitingRow], busy: Collection[str]) -> list[WaitingRow]:
-        """Those that are to be tried now: one of each receiver, at most so many at once. An attempt to a receiver that was
-        `busy` when they were read may have ended since: what it has planned is kept."""
+        """The deliveries to try now: one per receiver, up to a maximum at once. If a receiver was `busy` when they were
+        read, its attempt may have ended since: the pause that it planned still holds."""
         now, due = time.monotonic(), dict[str, WaitingRow]()
         with self._change:
             known, self._planned = self._planned, {}
@@ -139,13 +139,14 @@ class Outbox:
             return list(due.values())[: _AT_ONCE - len(self._busy)]
 
     def _left_to_others(self, row: WaitingRow) -> float:
-        """Seconds after which this service tries what it has not seen so: a file has no other service."""
+        """Seconds before this service tries a delivery last tried by another service; 0 on a database file, which has
+        one service."""
         return (
             0.0 if self._database.path is not None or row.attempts == 0 else pause_after(row.attempts) + LEASE_SECONDS
         )
 
     def _plan(self, row: DeliveryRow, pause: float) -> None:
-        """Try a delivery again after so many seconds."""
+        """Schedule the next attempt of a delivery after this many seconds."""
         with self._change:
             self._planned[row.delivery_key] = (row.attempts, row.last_attempt_at), time.monotonic() + pause
 
@@ -167,7 +168,7 @@ class Outbox:
             self.wake()
 
     def _look_at_the_clock(self) -> None:
-        """Raise the alarms of rigs that have been silent for longer than a rule says."""
+        """Raise alarms for rigs that have been silent for longer than a rule allows."""
         with self._database.reading() as connection:
             rules = [(row, raising.rule_of(row)) for row in alarms.enabled(connection)]
             rules = [(row, rule) for row, rule in rules if rule.quantity == raising.SILENT]
@@ -193,8 +194,8 @@ class Outbox:
         self._judged = judged
 
     def _silences(self, heard: Mapping[str, str]) -> dict[str, Silence]:
-        """For how long clutches are silent that were heard at these moments: a run that has come since the look before has
-        come now."""
+        """The durations of silence of clutches last heard at these moments; a run that arrived since the last look
+        counts as arriving now."""
         now, known, self._heard = time.monotonic(), self._heard, {}
         for clutch_id, since in heard.items():
             before = known.get(clutch_id)
@@ -205,17 +206,17 @@ class Outbox:
 
 
 def _seconds_since(moment: str) -> float:
-    """By the wall clock; 0 where that has been set back behind the moment."""
+    """Seconds since a moment by the wall clock; 0 if the clock was set back to before it."""
     return max(0.0, (datetime.now(UTC) - datetime.fromisoformat(moment)).total_seconds())
 
 
 def pause_after(attempts: int) -> float:
-    """Seconds between so many attempts and the next."""
+    """The pause [s] after this many attempts, before the next one."""
     return min(FIRST_PAUSE * 2.0 ** min(attempts, 30), LAST_PAUSE)
 
 
 def _store(connection: Connection, row: DeliveryRow, ended: Attempt) -> DeliveryRow:
-    """Store how an attempt ended, and return the delivery as it is then. A test message is tried only once."""
+    """Store an attempt's result and return the delivery in its new state. A test message is tried only once."""
     state, problem = webhooks.DELIVERED, ended.problem
     if problem is not None:
         state = webhooks.WAITING

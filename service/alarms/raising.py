@@ -33,7 +33,7 @@ RAISED, CLEARED, TEST = "alarm.raised", "alarm.cleared", "alarm.test"
 
 
 def evaluate(connection: Connection, clutch_id: str, silence: Silence | None = None) -> None:
-    """Raise and clear a clutch's alarms by what is stored of it now.
+    """Raise and clear a clutch's alarms by its stored data.
 
     For how long its rig is silent only the outbox measures (`silence`). For all others it is so at least for as long as it
     was when an alarm of that was raised: no wall clock raises or clears one.
@@ -76,12 +76,12 @@ def rule_of(row: AlarmRow) -> AlarmIn:
 
 
 def event_out(row: EventRow) -> EventOut:
-    """An alarm as it goes out."""
+    """An alarm as sent to clients."""
     return of_row(EventOut, row, **{name: value for name, value in row.content.items() if name != _ENDED_LIFE})
 
 
 def to_receivers(connection: Connection, kind: str, event: EventRow, receivers: Iterable[WebhookRow]) -> list[str]:
-    """Put an alarm into the outbox of receivers; the names of the deliveries."""
+    """Queue an alarm's delivery to each of these receivers; returns the ids of the deliveries."""
     names = []
     for receiver in receivers:
         delivery_id = secrets.token_hex(8)
@@ -99,12 +99,12 @@ def to_receivers(connection: Connection, kind: str, event: EventRow, receivers: 
 
 
 def receivers_of(connection: Connection, clutch_id: str | None) -> list[WebhookRow]:
-    """The receivers of a clutch's alarms; None: of those of all clutches."""
+    """The receivers of a clutch's alarms; `clutch_id` None: those for all clutches."""
     return [row for row in webhooks.page(connection) if row.content["clutch_id"] in (None, clutch_id)]
 
 
 def test_event(row: AlarmRow) -> EventRow:
-    """An alarm as the rule would raise it, for a test; it is stored nowhere."""
+    """An alarm as the rule would raise it, for a test; it is not stored."""
     rule, message = rule_of(row), "This is a test of the alarm: nothing is wrong."
     content = {"name": rule.name, "value": None, "limit": rule.limit, "message": message, "as_of_cycles": None}
     return EventRow(
@@ -119,7 +119,7 @@ def test_event(row: AlarmRow) -> EventRow:
 
 
 def _judged(row: AlarmRow, rule: AlarmIn, facts: ClutchFacts, before: EventRow | None) -> set[str]:
-    """Raise an alarm where its rule does; the rule's name where an alarm that was there stays."""
+    """Raise the rule's alarm, keep an earlier one, or clear it; returns the rule's id if an alarm is raised."""
     finding = rules.finding(rule, facts)
     if finding is None:
         return set()
@@ -135,7 +135,7 @@ def _judged(row: AlarmRow, rule: AlarmIn, facts: ClutchFacts, before: EventRow |
 
 
 def _is_of(event: EventRow, rule: AlarmIn, finding: Finding) -> bool:
-    """Whether an alarm is of what a rule watches and finds now."""
+    """Whether an alarm is about the quantity that the rule watches and its present finding."""
     return event.quantity == rule.quantity and finding.is_of(event.mark)
 
 
@@ -161,8 +161,8 @@ def _raise(row: AlarmRow, rule: AlarmIn, facts: ClutchFacts, finding: Finding) -
 
 
 def _reopened(row: AlarmRow, rule: AlarmIn, facts: ClutchFacts, finding: Finding) -> bool:
-    """Whether the alarm is one that the declared end of this life has cleared, and the end was taken back: it goes on, and
-    only receivers that were sent that it was over are sent it again."""
+    """Raise an alarm again that a declared end of life cleared, if the end was withdrawn; true if there is one. Only
+    receivers that were told of its clearing are informed."""
     connection = facts.connection
     if facts.summary.get("ended") is not None:
         return False
@@ -177,7 +177,7 @@ def _reopened(row: AlarmRow, rule: AlarmIn, facts: ClutchFacts, finding: Finding
 
 
 def _clear(event: EventRow, facts: ClutchFacts, *, replaced: bool = False) -> None:
-    """Note that an alarm is over; receivers learn of it, unless another of its rule has `replaced` it."""
+    """Clear an alarm and inform its receivers, unless another alarm of the rule has `replaced` it."""
     ended = {} if facts.summary.get("ended") is None else {_ENDED_LIFE: facts.summary.get("life", "")}
     content = {name: value for name, value in event.content.items() if name != _ENDED_LIFE}
     alarms.clear(facts.connection, event.event_id, facts.now, content | ended)
@@ -186,14 +186,16 @@ def _clear(event: EventRow, facts: ClutchFacts, *, replaced: bool = False) -> No
 
 
 def _tell(connection: Connection, kind: str, event_id: str, *, of_cleared: bool) -> None:
-    """Send an alarm to its clutch's receivers, or (`of_cleared`) to those that learn of cleared ones."""
+    """Queue an alarm's delivery to its clutch's receivers; `of_cleared`: only to those that want to know of cleared
+    alarms."""
     if (event := alarms.event(connection, event_id)) is not None:
         receivers = receivers_of(connection, event.clutch_id)
         to_receivers(connection, kind, event, [row for row in receivers if row.content["cleared"] or not of_cleared])
 
 
 def _with_silence(facts: ClutchFacts, kept: set[str]) -> ClutchRow:
-    """The clutch with since when its rig is silent; `kept` are the alarms of silence, which were judged alone so far."""
+    """The clutch with the time since which its rig is silent; `kept` are the alarms that stay raised, so far of silence
+    alone."""
     row, silent = facts.clutch, facts.heard() if kept else None
     if silent is None and row.silent is None:
         return row

@@ -34,15 +34,15 @@ Address = ipaddress.IPv4Address | ipaddress.IPv6Address
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Attempt:
-    """How an attempt ended: the answer's status, None without an answer; `problem` is why it was not taken, None where it
-    was."""
+    """The result of an attempt: the response status, None without a response; `problem` says why the receiver did not
+    accept it, None if it did."""
 
     status: int | None = None
     problem: str | None = None
 
 
 class NotAllowedError(Exception):
-    """An address is none that the service may ask."""
+    """The service may not send to this address."""
 
 
 def require_web_address(url: str) -> SplitResult:
@@ -60,23 +60,23 @@ def require_web_address(url: str) -> SplitResult:
 
 
 def has_controls(url: str) -> bool:
-    """Whether an address holds blanks or control characters, which none has."""
+    """Whether an address holds blanks or control characters, which no valid address has."""
     return any(ord(sign) <= 32 or ord(sign) == 127 for sign in url)
 
 
 def scheme_of(url: str) -> str:
-    """What stands before `://`, in small letters; empty where nothing does."""
+    """The scheme of an address (before `://`), in lower case; empty if it has none."""
     scheme, mark, _ = url.partition("://")
     return scheme.lower() if mark else ""
 
 
 def wrong_address(message: str) -> InvalidError:
-    """What is answered where a receiver's address cannot be used; the address is not quoted, for it may hold a password."""
+    """The error for an unusable receiver address; the address is not quoted, because it may hold a password."""
     return InvalidError.of(message, code="address", pointer="/url")
 
 
 def shown(url: str) -> str:
-    """An address without what may be secret in it: password, query, parts of the path that look like tokens."""
+    """An address with possible secrets masked: password, query, and parts of the path that look like tokens."""
     if scheme_of(url) not in _PORTS:
         return f"{scheme_of(url)}://***"
     parts = urlsplit(url)
@@ -104,7 +104,7 @@ def allowed(parts: SplitResult, *, private: bool) -> tuple[Any, ...]:
 
 
 def why_not(address: Address, *, private: bool) -> str | None:
-    """Why an address may not be asked, None where it may. An IPv4 address within an IPv6 one counts as itself."""
+    """Why the service may not call an address; None if it may. An IPv4 address within an IPv6 one counts as itself."""
     inner = _embedded_ipv4(address)
     if inner is not None:
         return why_not(inner, private=private)
@@ -135,13 +135,13 @@ def _embedded_ipv4(address: Address) -> ipaddress.IPv4Address | None:
 
 
 def signature(secret: str, body: bytes, at: int) -> str:
-    """`t=UNIX,v1=HEX`: HMAC-SHA256 of `t.body` under the secret."""
+    """The signature header `t=UNIX,v1=HEX`: HMAC-SHA256 of `t.body` under the secret."""
     signed = hmac.new(secret.encode(), f"{at}.".encode() + body, hashlib.sha256).hexdigest()
     return f"t={at},v1={signed}"
 
 
 def post(url: str, body: bytes, *, secret: str, delivery_id: str, private: bool) -> Attempt:
-    """One attempt to send a signed body."""
+    """Make one attempt to send a signed body."""
     deadline = time.monotonic() + ATTEMPT_SECONDS
     try:
         parts = require_web_address(url)
@@ -171,8 +171,8 @@ def post(url: str, body: bytes, *, secret: str, delivery_id: str, private: bool)
 
 
 def _status(parts: SplitResult, address: tuple[Any, ...], body: bytes, headers: dict[str, str], deadline: float) -> int:
-    """The status of the answer; of the answer's body nothing is read. The connection is cut at the deadline, however slowly
-    something still comes."""
+    """The response's status; its body is not read. The connection is closed at the deadline, even while data still
+    arrive slowly."""
     host, port = parts.hostname or "", parts.port or _PORTS[parts.scheme]
     path = (parts.path or "/") + (f"?{parts.query}" if parts.query else "")
     connection = http.client.HTTPConnection(host, port)
@@ -197,7 +197,7 @@ def _cut(raw: socket.socket) -> None:
 
 
 def _in_words(error: Exception) -> str:
-    """An error without what it may quote of the address."""
+    """A sentence for an error, without any text that may quote the address."""
     if isinstance(error, socket.gaierror):
         return "the host name of the receiver is not known: check its address"
     if isinstance(error, ssl.SSLCertVerificationError):

@@ -33,7 +33,7 @@ STEPS = (0.5, 0.25)
 
 @dataclass(frozen=True, slots=True)
 class Silence:
-    """For how many hours at least no run has arrived since the one of that moment (`since`, ISO 8601)."""
+    """The minimum number of hours without a run since the one received at `since` (ISO 8601)."""
 
     since: str
     hours: float
@@ -41,8 +41,8 @@ class Silence:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClutchFacts:
-    """What is stored of a clutch now, as rules look at it; what few rules need is read when one does. `silences`: what is
-    known of its rig's, of its last run or of earlier ones."""
+    """The stored facts of a clutch, for rules to check; facts that few rules need are read on demand. `silences`: known
+    periods of silence of its rig, since its last run or earlier ones."""
 
     connection: Connection
     clutch: ClutchRow
@@ -65,8 +65,8 @@ class ClutchFacts:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Finding:
-    """What a rule finds: its value, the clause that says it, and a `mark` of what it is about; the same mark, the same
-    alarm. Of remaining life: its `median`, and the `step` that the value has passed, which is the mark."""
+    """A rule's finding: its value, a clause that states it, and a `mark` that identifies its subject: the same mark is
+    the same alarm. For remaining life: its `median`, and as mark the `step` that the value has passed."""
 
     value: float | None
     words: str
@@ -75,17 +75,18 @@ class Finding:
     step: int | None = None
 
     def is_of(self, mark: str) -> bool:
-        """Whether an alarm of that mark is about this: a step on the way to the end includes those before it."""
+        """Whether an alarm with that mark is about this finding: an alarm of a later step towards the end of life
+        covers earlier steps."""
         return self.mark == mark or (self.step is not None and self.step < int(mark or 0))
 
 
 def finding(rule: AlarmIn, facts: ClutchFacts) -> Finding | None:
-    """What a rule finds of a clutch; None where there is nothing to compare."""
+    """The rule's finding for a clutch; None if there is nothing to compare."""
     return _QUANTITIES[rule.quantity](rule, facts)
 
 
 def passes(rule: AlarmIn, result: Finding, hysteresis: float = 0.0) -> bool:
-    """Whether a rule raises an alarm; by its hysteresis, whether one that is raised stays."""
+    """Whether the finding raises the rule's alarm or, with the rule's hysteresis, keeps a raised one."""
     if result.value is None:
         return True
     if rule.below is not None:
@@ -96,7 +97,7 @@ def passes(rule: AlarmIn, result: Finding, hysteresis: float = 0.0) -> bool:
 
 
 def message(rule: AlarmIn, facts: ClutchFacts, result: Finding) -> str:
-    """An alarm as a sentence, with how many runs are held beside it."""
+    """An alarm as a sentence, with the number of held runs."""
     unit, held_count = _UNITS.get(rule.quantity), facts.summary.get("held", 0)
     again = f"; less than {100 * STEPS[result.step - 1]:.0f} % of it is left" if result.step else ""
     limit = "" if rule.limit is None or unit is None else f" (limit: {rule.limit:,.6g}{unit}{again})"
@@ -105,9 +106,9 @@ def message(rule: AlarmIn, facts: ClutchFacts, result: Finding) -> str:
 
 
 def slope_quantile(rule: AlarmIn, fit: FitRow, geometry: Geometry) -> float | None:
-    """dμ/dv [s/m] of a fitted curve at the rule's speed, at the quantile of its standard error; None without friction.
+    """The quantile of dμ/dv [s/m] of a fitted curve at the rule's speed, by its standard error; None without friction.
 
-    Value and sd as `models.friction.identification.cof_slope` has them, Σ by the unbiased noise.
+    Value and standard error as in `models.friction.identification.cof_slope`, with Σ from the unbiased noise.
     """
     parameters = StribeckParameters(**{name: getattr(fit, name) for name in PARAMETER_NAMES})
     velocity = geometry.sliding_velocity(np.array(rule.speed_rpm * RADIANS_PER_SECOND_PER_RPM))
@@ -120,8 +121,8 @@ def slope_quantile(rule: AlarmIn, fit: FitRow, geometry: Geometry) -> float | No
 
 
 def _remaining(rule: AlarmIn, facts: ClutchFacts) -> tuple[float, float] | None:
-    """The remaining cycles at the rule's quantile and their median, held runs considered, at most the horizon; None where
-    nothing is known, or the quantile is beyond the horizon."""
+    """The remaining cycles at the rule's quantile and their median, with held runs considered, at most the horizon;
+    None if they are unknown or the quantile is beyond the horizon."""
     summary = facts.summary
     if summary.get("status", INSUFFICIENT) in (INSUFFICIENT, ENDED):
         return None
@@ -138,13 +139,13 @@ def _remaining_cycles(rule: AlarmIn, facts: ClutchFacts) -> Finding | None:
 
 
 def _of_remaining(rule: AlarmIn, value: float, median: float, words: str) -> Finding:
-    """What is found of remaining cycles or days, with the step that they have passed."""
+    """The finding on remaining cycles or days, with the step that they have passed."""
     step = sum(value < share * (rule.limit or 0.0) for share in STEPS)
     return Finding(value=value, words=words, median=median, step=step, mark=f"{step}")
 
 
 def _left(rule: AlarmIn, cycles: float, median: float) -> str:
-    """The remaining cycles at the rule's quantile, and how sure that is: their median."""
+    """The remaining cycles at the rule's quantile in words, with their median as a measure of certainty."""
     if cycles < 1.0 and median < 1.0:
         return condition.bound_in_words(cycles)
     half = f"50 % chance of {condition.rounded_down(max(1.0, median))} or more"
@@ -169,8 +170,8 @@ def _health(_rule: AlarmIn, facts: ClutchFacts) -> Finding | None:
 
 
 def _shudder_margin(rule: AlarmIn, facts: ClutchFacts) -> Finding | None:
-    """The least slope dμ/dv over the pressures of the newest stationary test (by cycles), if it counts and has curves, at
-    the quantile of its standard error."""
+    """The smallest slope dμ/dv over the pressures of the newest stationary test (by cycles), at the quantile of its
+    standard error, if the test is accepted and has curves."""
     newest = runs.newest_fitted(facts.connection, facts.clutch_id, STATIONARY)
     margins = [
         (margin, fit.pressure)
@@ -194,7 +195,7 @@ def _held_runs(_rule: AlarmIn, facts: ClutchFacts) -> Finding | None:
 
 
 def _off_course(_rule: AlarmIn, facts: ClutchFacts) -> Finding | None:
-    """Why the newest test is off its course: the warning of the prediction, or the doubt of a held run."""
+    """The reason why the newest test is off its course: the prediction's warning, or the doubt about a held run."""
     newest = results.prediction_at(facts.connection, facts.clutch_id, condition.SHOWN, ALL_PRESSURES)
     notices = [] if newest is None else [notice for notice in newest.payload["warnings"] if notice["code"] == OFF_TRACK]
     for row in runs.page(facts.connection, facts.clutch_id, state=runs.HELD):

@@ -35,7 +35,7 @@ def look_up(database: Database, clutch_id: str) -> ClutchOut:
 
 
 def every(database: Database, *, at_once: int) -> Iterator[ClutchOut]:
-    """All clutches in use by their names, so many of them in memory."""
+    """All clutches in use, by name, read `at_once` at a time."""
     part: Part | None = Part(at_once)
     while part is not None:
         with database.reading() as connection:
@@ -55,8 +55,8 @@ def page_as_json(
     offset: int = 0,
     sort: str = "worst",
 ) -> bytes:
-    """A page of the clutches of a choice; each one's item is made once for its revision, verdict and alarms. If they are not
-    by name, a page's place is how many clutches are before it."""
+    """A page of the chosen clutches as JSON; each clutch's item is cached for its revision, verdict and alarms. In an
+    order other than by name, a page's cursor is the number of clutches before it."""
     named, limit = sort == "name", part.limit
     before = offset + (0 if named else int(max(0.0, part.number or 0.0)))
     with database.reading() as connection:
@@ -81,7 +81,7 @@ def page_as_json(
 
 
 def totals(database: Database, choice: ClutchSelection) -> FleetTotals:
-    """How many clutches of a choice there are, and the cycles at the right end of their intervals' bars."""
+    """The number of chosen clutches, and the cycles at the right end of the bars of their intervals."""
     with database.reading() as connection:
         listed = clutches.counts(connection, choice)
         archived = clutches.counts(connection, replace(choice, archived=True))
@@ -98,7 +98,8 @@ def totals(database: Database, choice: ClutchSelection) -> FleetTotals:
 
 
 def _round_above(row: ClutchRow) -> float:
-    """1, 2 or 5 times a power of ten, not below the upper end of a clutch's interval, or what is known of it."""
+    """The smallest 1, 2, 5 or 10 times a power of ten that is at least the upper end of a clutch's interval of
+    remaining cycles."""
     quantiles = row.summary["remaining_cycles"]
     end = max(row.rank, *(end for end in (quantiles["0.5"], quantiles["0.95"]) if end is not None), 1.0)
     unit = 10.0 ** math.floor(math.log10(end))
@@ -107,7 +108,7 @@ def _round_above(row: ClutchRow) -> float:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Shown:
-    """A clutch with its newest finished diagnosis and its alarms that nobody has acknowledged, both as they go out."""
+    """A clutch with its newest finished diagnosis and its unacknowledged alarms, both as sent to clients."""
 
     row: ClutchRow
     diagnosis: LatestDiagnosis | None

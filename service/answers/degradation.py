@@ -54,10 +54,11 @@ def degradation(
     draws: int = 0,
     until: float | None = None,
 ) -> Degradation:
-    """The tracks of a life by a filter: of one quantity wherever it was measured, or of mean COF and every parameter.
+    """The tracks of a life by one filter: of one quantity at each place where it was measured, or of mean COF and every
+    parameter.
 
-    As it was at `at_cycles`, of the present life or of an earlier one by its number; with so many joint `draws` of the
-    coefficients, and trajectories up to `until` cycles. Raises NotFoundError, and InvalidError for a quantity that is none.
+    They are as of `at_cycles`, of the present life or an earlier one by its number, with as many joint `draws` of the
+    coefficients, and trajectories up to `until` cycles. Raises NotFoundError, and InvalidError for an unknown quantity.
     """
     asked_quantity = None if quantity is None else quantity_named(quantity)
     with database.reading() as connection:
@@ -89,7 +90,7 @@ def degradation(
 
 
 def _follows_from_fits(quantity: Quantity | None) -> bool:
-    """Whether the tracks of a quantity, or of mean COF and every parameter, follow from fitted curves alone."""
+    """Whether the tracks of a quantity (None: of mean COF and every parameter) need fitted curves alone."""
     return quantity is None or quantity.family not in (Family.LAG, Family.ENGAGEMENT)
 
 
@@ -101,7 +102,8 @@ def arguments(
     draws: int = 0,
     until: float | None = None,
 ) -> tuple[Hashable, ...]:
-    """The arguments of `degradation` behind the clutch; none where all are left out: so the answer is kept under one key."""
+    """The arguments of `degradation` after the clutch; an empty tuple if all have their defaults, so that the answer
+    has one cache key."""
     all_arguments = (method, quantity, at_cycles, life, draws, until)
     return () if all_arguments == ("grid", None, None, None, 0, None) else all_arguments
 
@@ -120,7 +122,7 @@ def _all_tracks(measured: MeasuredLife, method: str, draws: int, until: float | 
 def _items(
     measured: MeasuredLife, quantity: Quantity, method: str, draws: int, until: float | None
 ) -> list[DegradationItem]:
-    """One quantity wherever it was measured."""
+    """The tracks of one quantity at each place where it was measured."""
     if quantity.family is Family.SLOPE:
         return _slopes(measured, quantity, method, until)
     return [
@@ -130,7 +132,7 @@ def _items(
 
 
 def _slopes(measured: MeasuredLife, quantity: Quantity, method: str, until: float | None) -> list[DegradationItem]:
-    """Slopes from the joint tracks of the parameters at their pressure."""
+    """Tracks of the slope of the Stribeck curve, computed from the joint tracks of the parameters at their pressure."""
     slopes = measured.series(quantity)
     tracks = parameter_tracks(measured.life, measured.assumptions, measured.tests, method)
     direct = {
@@ -149,7 +151,7 @@ def _tracked(several: Iterable[Series], method: str) -> list[Track]:
 
 
 def rows(answer: Degradation) -> Iterator[Cells]:
-    """Eq. 6's coefficients as rows of a table, a row a quantity and place."""
+    """The coefficients of eq. 6 as rows of a table, one row per quantity and place."""
     for item in answer.items:
         estimates = {name: getattr(item.coefficients, name, None) for name in COEFFICIENTS}
         yield (

@@ -33,7 +33,7 @@ _OF_ROW = (
 
 
 def diagnosis(database: Database, clutch_id: str, diagnosis_id: str) -> DiagnosisOut:
-    """A diagnosis as it is answered. Raises NotFoundError."""
+    """A diagnosis as sent to clients. Raises NotFoundError."""
     with database.reading() as connection:
         repository.clutch(connection, clutch_id)
         return _items(connection, clutch_id, [repository.diagnosis(connection, clutch_id, diagnosis_id)], DiagnosisOut)[
@@ -49,7 +49,7 @@ PLAN_COLUMNS = (
 
 
 def plan(database: Database, clutch_id: str, diagnosis_id: str) -> PlanOut:
-    """The tests that a diagnosis advises, as a protocol: alternatives, best first. Raises NotFoundError."""
+    """The tests that a diagnosis advises, as a test protocol: alternatives, best first. Raises NotFoundError."""
     tests = [test for test in diagnosis(database, clutch_id, diagnosis_id).advice if test.steps]
     return PlanOut(clutch_id=clutch_id, diagnosis_id=diagnosis_id, relation="alternatives", tests=tests)
 
@@ -68,7 +68,7 @@ def plan_rows(protocol: PlanOut) -> Iterator[Cells]:
 
 
 def page(database: Database, clutch_id: str, part: Part) -> DiagnosisPage:
-    """Diagnoses without their maps and loops, newest first. Raises NotFoundError."""
+    """A page of diagnoses without their maps and loops, newest first. Raises NotFoundError."""
     with database.reading() as connection:
         repository.clutch(connection, clutch_id)
         rows = diagnoses.page(connection, clutch_id, limit=part.most, before=part.number)
@@ -77,7 +77,7 @@ def page(database: Database, clutch_id: str, part: Part) -> DiagnosisPage:
 
 
 def _items(connection: Connection, clutch_id: str, rows: list[DiagnosisRow], shape: type[Shape]) -> list[Shape]:
-    """Diagnoses in a shape, whole or as lists show them."""
+    """Diagnoses of the given type: complete, or shortened for lists."""
     life = repository.present_life(connection, clutch_id)
     adoption = repository.adoption(connection, clutch_id)
     in_force = adoption.diagnosis_id if adoption is not None and adoption.life == life else None
@@ -97,7 +97,7 @@ def _items(connection: Connection, clutch_id: str, rows: list[DiagnosisRow], sha
 
 
 def model(database: Database, clutch_id: str) -> ModelOut:
-    """The model in force and all versions, newest first. Raises NotFoundError."""
+    """The model in force and all adopted versions, newest first. Raises NotFoundError."""
     with database.reading() as connection:
         repository.clutch(connection, clutch_id)
         rows = assumptions.adoptions_of(connection, clutch_id)

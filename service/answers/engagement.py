@@ -32,10 +32,10 @@ from storage.engine.database import Database
 
 
 def engaged(database: Database, clutch_id: str, at_cycles: float | None, run_id: str | None = None) -> EngagementOut:
-    """The engagement that the tracked clutch would give at `at_cycles`, or now, and the measured ones.
+    """The simulated engagement of the tracked clutch at `at_cycles` or now, and the measured engagements.
 
-    `run_id`: the measured engagement that is compared with the model; left out, the newest of that life by then. Raises
-    NotFoundError before the first stationary test with all parameters, and where the named run holds no such engagement.
+    `run_id`: the measured engagement to compare with the model (default: the newest of that life by then). Raises
+    NotFoundError before the first stationary test with all parameters, and if the named run holds no such engagement.
     """
     with database.reading() as connection:
         state, levels = repository.state(connection, clutch_id), repository.levels(connection, clutch_id)
@@ -91,7 +91,7 @@ def _compared_row(measured: Sequence[MeasuredEngagement], life: Life, run_id: st
 def _comparison(
     run: IncomingRun, row: MeasuredEngagement, capacity: Capacity, geometry: Geometry
 ) -> ComparedEngagement | None:
-    """A measured engagement beside the model's; the model's part is null where the record does not show its drive."""
+    """A measured engagement beside the model's; the model's part is null if the record lacks the drive's course."""
     engagement = evaluated(run, geometry)
     if not isinstance(engagement, EngagementIndicators):
         return None
@@ -109,7 +109,7 @@ def _comparison(
 
 
 def _model_part(found: EngagementDiscrepancy, contact: float) -> ModelledEngagement:
-    """The model's engagement from the measured one's conditions, and how far the measured one is from it."""
+    """The model's engagement under the measured one's conditions, and the deviation between the two."""
     difference = found.stop_time_difference
     return ModelledEngagement(
         channels=EngagementTrace(**_course(found.trace, contact)),
@@ -125,7 +125,7 @@ def _model_part(found: EngagementDiscrepancy, contact: float) -> ModelledEngagem
 def _parameters(
     life: Life, assumptions: Assumptions, fits: Mapping[str, Sequence[LevelFit]], moments: Sequence[float]
 ) -> list[dict[float, StribeckParameters]]:
-    """At each of several cycles since new, the parameters by pressure [Pa], each the median of its own track."""
+    """The parameters by pressure [Pa] at each of several cycles since new; each is the median of its own track."""
     levels, medians = parameter_medians(life, assumptions, fits, np.array(moments))
     if not levels:
         raise NotFoundError(
@@ -137,6 +137,6 @@ def _parameters(
 
 
 def _course(trace: Engagement, contact: float = 0.0) -> dict[str, list[float]]:
-    """The channels of a simulated engagement, its time from `contact` [s] on."""
+    """The channels of a simulated engagement, with time [s] counted from `contact`."""
     columns = {"time_s": trace.time - contact, "pressure_bar": trace.pressure, "speed_rpm": trace.speed}
     return public_channels(columns | {"torque_nm": trace.torque})

@@ -23,7 +23,7 @@ COLUMNS = (*_KINDS, "severity", *_OWN)
 
 
 def page(database: Database, part: Part) -> FleetPriorPage:
-    """The newest version of every prior."""
+    """A page of the newest version of every prior."""
     with database.reading() as connection:
         priors = part.sliced([_item(row) for row in assumptions.current_fleet_priors(connection)])
     return FleetPriorPage(items=[*priors.items], next=priors.next)
@@ -47,7 +47,7 @@ def rows(page: FleetPriorPage) -> Iterator[Cells]:
 
 
 def _item(row: FleetPriorRow) -> FleetPriorOut:
-    """A prior as it goes out: medians, and the factor or share by which two thirds of the clutches stay within."""
+    """A prior as sent to clients: medians, and the factor or share within which two thirds of the clutches lie."""
     return of_row(
         FleetPriorOut,
         row,
@@ -62,7 +62,8 @@ def _item(row: FleetPriorRow) -> FleetPriorOut:
 
 
 def _severity_exponent(row: FleetPriorRow) -> SeverityEstimate | None:
-    """The exponent q of life ∝ energy^-q by ended lives, with its deviation; None if they do not determine it."""
+    """The exponent q of life ∝ energy^-q from ended lives, with its standard deviation; None if they do not determine
+    it."""
     lives = [ObservedLife.from_dict(stored) for stored in row.content.get("ended", ())]
     by_energy = [(life.end, life.energy) for life in lives if life.energy]
     if len(by_energy) < FEWEST_SEVERITIES or len({energy for _, energy in by_energy}) == 1:

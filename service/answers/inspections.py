@@ -22,7 +22,7 @@ COLUMNS = (
 
 
 def page(database: Database, clutch_id: str, part: Part) -> InspectionPage:
-    """Inspections by cycles. Raises NotFoundError."""
+    """A page of inspections by cycles. Raises NotFoundError."""
     with database.reading() as connection:
         repository.clutch(connection, clutch_id)
         rows = inspections.page(connection, clutch_id, limit=part.most, after=part.after)
@@ -45,14 +45,14 @@ def look_up(database: Database, clutch_id: str, inspection_id: str) -> Inspectio
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Photograph:
-    """The file of a photograph where it lies."""
+    """A stored photograph's file, to be read piece by piece."""
 
     database: Database
     row: PhotographRow
 
     def pieces(self, size: int) -> Iterator[bytes]:
-        """So many bytes of it at once, each read in a transaction of its own. Raises DamagedData, before the last piece,
-        where it is not what was sent."""
+        """The file in pieces of this size, each read in a transaction of its own. Raises DamagedData before the last
+        piece if the content differs from the one sent."""
         digest = hashlib.sha256()
         for start in range(0, self.row.bytes, size):
             with self.database.reading() as connection:
@@ -64,7 +64,7 @@ class Photograph:
 
 
 def photograph(database: Database, clutch_id: str, inspection_id: str, photograph_id: str) -> Photograph:
-    """A photograph; its content is not read yet. Raises NotFoundError."""
+    """A photograph, whose content is not yet read. Raises NotFoundError."""
     with database.reading() as connection:
         key = inspection(connection, clutch_id, inspection_id).inspection_key
         for row in inspections.photographs(connection, [key])[key]:

@@ -12,13 +12,13 @@ from storage.jobs import JobRow
 
 
 def find(database: Database, job_id: str, *, only: Collection[str] | None) -> JobRow:
-    """The job, of one of `only` these clutches. Raises NotFoundError, too where it is another's."""
+    """The job, if it concerns one of the clutches `only`. Raises NotFoundError, also for a job of other clutches."""
     with database.reading() as connection:
         return found(jobs.get(connection, job_id), "job", job_id, only=only)
 
 
 def page(database: Database, part: Part, *, state: str | None, only: Collection[str] | None) -> JobPage:
-    """Jobs in that state, of `only` these clutches, newest first."""
+    """A page of jobs in that state, limited to the clutches `only`, newest first."""
     with database.reading() as connection:
         rows = jobs.page(connection, limit=part.most, before=part.number, state=state, only=only)
     return part.of(JobPage, rows, by_key("job_key"), shown)

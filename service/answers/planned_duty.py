@@ -46,7 +46,7 @@ Blocks = Sequence[PlannedBlock]
 
 
 def planned_life(database: Database, clutch_id: str, method: str, planned: ProgrammeIn) -> PlannedLife:
-    """The remaining useful life of the present life under a programme, by one filter. Raises NotFoundError."""
+    """The remaining useful life of the present life under a planned programme, by one filter. Raises NotFoundError."""
     with database.reading() as connection:
         state = repository.state(connection, clutch_id, carried=True)
     events = state.lives[-1].events if state.events else ()
@@ -74,8 +74,8 @@ def planned_life(database: Database, clutch_id: str, method: str, planned: Progr
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Plan:
-    """What is stated of a programme: the remaining cycles were recent duty to go on, the blocks until the end, how severe a
-    cycle of each block is, and what a planned cycle was counted by."""
+    """Figures of a programme: the remaining cycles if recent duty continued, the blocks until the end of life, the
+    severity of a cycle of each block, and the basis by which planned cycles were counted."""
 
     recent_duty_cycles: Quantiles
     remaining_blocks: Quantiles
@@ -84,7 +84,8 @@ class _Plan:
 
 
 def _prediction(state: ClutchHistory, method: str, planned: ProgrammeIn) -> tuple[LifePrediction, _Plan]:
-    """The prediction under recent duty, or in its place what the programme makes of it; and what is stated of that."""
+    """The remaining life under the programme (under recent duty if too few tests, or past its end), and the programme's
+    figures."""
     assumptions, fraction = state.assumptions, state.fraction
     series = state.lives[-1].pooled(assumptions) if state.events else None
     basis = assumptions.severity.basis.value
@@ -126,8 +127,8 @@ def _prediction(state: ClutchHistory, method: str, planned: ProgrammeIn) -> tupl
 def _planned_end(
     recent: LifePrediction, programme: DutyProgramme, end: StatedEnd, series: Series, *, now: float, most: float
 ) -> tuple[LifePrediction, Quantiles]:
-    """When the life ends: as it was where that is past, else after as many cycles as ζ takes to get there, up to `most`; and
-    the blocks until then."""
+    """The predicted end under the programme: unchanged if it is past, else when severity-weighted cycles ζ reach the
+    end of life, at most `most` cycles ahead; and the blocks until then."""
     draws = np.arange(end.ends.size) % programme.rates.shape[0]
     ahead = end.ends - float(series.scale.progress(now))
     spread = DutyProgramme(cycles=programme.cycles, rates=programme.rates[draws])
@@ -149,8 +150,8 @@ def _planned_end(
 
 
 def _counted(state: ClutchHistory, severity: Severity, series: Series, planned: ProgrammeIn) -> "_Counted":
-    """How planned duty counts: as the record says; where that counts cycles and both the programme and the life's duty state
-    energies, by its energy beside the mean of recent duty, in proportion."""
+    """How planned cycles count: as the clutch's record states. If it counts plain cycles but the programme and the
+    life's duty both state energies: in proportion to energy, relative to the mean of recent duty."""
     plain = _Counted(severity=severity, scale=series.scale.severity, geometry=state.geometry)
     stated = any(block.energy_per_cycle_kj is not None for block in planned.programme)
     if severity.basis is not SeverityBasis.CYCLES or planned.counted_by == "cycles" or not stated:
@@ -167,8 +168,8 @@ def _counted(state: ClutchHistory, severity: Severity, series: Series, planned: 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Counted:
-    """How the severity of a life is counted: its ζ so far, and the disc that turns speed and pressure into energy;
-    `assumed`: by energy, though the record counts cycles."""
+    """How severity is counted in a life: its ζ so far, and the disc geometry that converts speed and pressure to
+    energy; `assumed`: by energy, although the record counts plain cycles."""
 
     severity: Severity
     scale: SeverityMap
@@ -176,7 +177,8 @@ class _Counted:
     assumed: bool = False
 
     def programme(self, blocks: Blocks, cof: float, rng: np.random.Generator) -> DutyProgramme:
-        """The programme, by draws of what it leaves open; what states no severity is as severe as recent duty."""
+        """The programme, with random draws for unstated values; a block without a stated severity counts like recent
+        duty."""
         rates = np.full((_PLANS, len(blocks)), self.scale.rate)
         for place, block in enumerate(blocks):
             work = self._work(block, cof, rng.permutation(_NORMALS))
@@ -185,7 +187,7 @@ class _Counted:
         return DutyProgramme(cycles=np.array([block.cycles for block in blocks]), rates=rates)
 
     def notices(self, blocks: Blocks) -> list[Notice]:
-        """A warning where what the programme plans cannot be counted."""
+        """A warning if planned cycles count by an assumed energy, or if their severity cannot be counted."""
         basis = self.severity.basis.value.replace("_", " ")
         if self.assumed and self.scale.reference is not None:
             recent = f"{self.scale.reference / 1e3:.3g} kJ a cycle of recent duty"
@@ -206,7 +208,7 @@ class _Counted:
         return [Notice(code="severity_not_counted", message=f"{why}: planned cycles count like those of recent duty")]
 
     def _work(self, block: PlannedBlock, cof: float, normals: FloatArray) -> FloatArray | None:
-        """The energy [J] or slid angle [rad] of a cycle, by draw [n]; None where the block states none."""
+        """The energy [J] or slid angle [rad] of a cycle, by draw [n]; None if the block states neither."""
         if self.severity.basis is SeverityBasis.CYCLES:
             return None
         speed = block.initial_speed_rpm
@@ -229,7 +231,8 @@ class _Counted:
 def _dates(
     ends: Mapping[str, float | None], events: Sequence[Event], pace: float | None
 ) -> dict[str, str | None] | None:
-    """When cycles since new by quantile have been run at a pace an hour; None without a pace or a run."""
+    """The dates at which these cycles since new, by quantile, are reached at a pace [cycles/h]; None without a pace or
+    a run."""
     if pace is None or not events:
         return None
     return {

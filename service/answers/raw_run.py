@@ -39,7 +39,8 @@ Values = Callable[[str], FloatArray]
 
 
 def write_json(file: IO[bytes] | gzip.GzipFile, head: RunDescription, names: tuple[str, ...], values: Values) -> None:
-    """`head` as JSON with `channels` as its last field, numbers such that the same doubles are read from them."""
+    """Write `head` as JSON with `channels` as its last field; numbers are written such that they read back as the same
+    doubles."""
     file.write(to_text(repository.json_of(head)).encode()[:-1] + b',"channels":{')
     for index, name in enumerate(names):
         file.write((b"," if index else b"") + to_text(name).encode() + b":[")
@@ -51,7 +52,7 @@ def write_json(file: IO[bytes] | gzip.GzipFile, head: RunDescription, names: tup
 
 
 def parquet_writer() -> str:
-    """What writes Parquet here, with its version. Raises NotAcceptableError where nothing does."""
+    """The name and version of the library that writes Parquet. Raises NotAcceptableError if none is installed."""
     try:
         return f"{_PACKAGE} {version(_PACKAGE)}"
     except PackageNotFoundError:
@@ -60,7 +61,8 @@ def parquet_writer() -> str:
 
 
 def write_parquet(path: Path, head: RunDescription, names: tuple[str, ...], values: Values) -> None:
-    """A column a channel with its unit under `unit` of the field's metadata, and `head` as JSON under `clutchlife`."""
+    """Write one column per channel, its unit in the field's metadata as `unit`, and `head` as JSON in the file's as
+    `clutchlife`."""
     parquet_writer()
     import pyarrow as arrow  # type: ignore[import-untyped]  # start-up time, optional package
     import pyarrow.parquet as parquet  # type: ignore[import-untyped]  # start-up time, optional package
@@ -86,16 +88,17 @@ _LEVEL = 6
 def entity_tag(
     database: Database, clutch_id: str, run_id: str, *, points: int | None, kind: Kind, compressed: bool = False
 ) -> str:
-    """The tag that `write_run` will return unless the run's receipt changes meanwhile; reads no channel.
+    """The tag that `write_run` will return if the run's receipt does not change meanwhile; no channel is read.
 
-    Raises NotFoundError, and NotAcceptableError where the format is not written here.
+    Raises NotFoundError, and NotAcceptableError if the format cannot be written here.
     """
     _, head, _ = _look_up(database, clutch_id, run_id)
     return _tag(head, points, kind, compressed)
 
 
 def _tag(head: RunDescription, points: int | None, kind: Kind, compressed: bool) -> str:
-    """The hashes in the receipt and, where its file was read again, in the audit trail stand for the channels."""
+    """The entity tag from the hashes of the content, in the receipt and (if its file was read again) in the audit
+    trail; no channel is read."""
     writer = parquet_writer() if kind == "parquet" else "json"
     content = to_text([_FORM, repository.json_of(head), points, writer, compressed])
     return f'"{hashlib.sha256(content.encode()).hexdigest()[:32]}"'
@@ -111,7 +114,7 @@ def write_run(
     path: Path,
     compressed: bool = False,
 ) -> str:
-    """Write the body of the answer to `path` and return the entity tag of what was written.
+    """Write the response body to `path` and return its entity tag.
 
     `points`: as many samples of a sampled record at most, chosen by `decimation`; plateaus are written whole, and so is
     Parquet. `compressed`: JSON as a gzip file. Memory: one channel as it is stored and one decoded; for Parquet all decoded.
@@ -128,7 +131,7 @@ def write_run(
 
 
 def file_sha256(database: Database, clutch_id: str, run_id: str) -> str:
-    """The hash of the file that a run was read from. Raises NotFoundError where there is none."""
+    """The hash of the file from which a run was read. Raises NotFoundError where there is none."""
     with database.reading() as connection:
         file = repository.run(connection, clutch_id, run_id).details.get("file")
     if file is None:
@@ -137,8 +140,8 @@ def file_sha256(database: Database, clutch_id: str, run_id: str) -> str:
 
 
 def copy_file(database: Database, clutch_id: str, run_id: str, *, path: Path) -> None:
-    """Write the file that a run was read from to `path`, as it was sent. Raises NotFoundError where there is none, and
-    DamagedData where it is not what was sent."""
+    """Write the file from which a run was read to `path`, as it was sent. Raises NotFoundError if there is none, and
+    DamagedData if the stored content differs from the one sent."""
     with database.reading() as connection:
         row = repository.run(connection, clutch_id, run_id)
         stored = raw_columns.file_of(connection, row.run_key)
@@ -150,12 +153,12 @@ def copy_file(database: Database, clutch_id: str, run_id: str, *, path: Path) ->
 
 
 def _packed(file: BinaryIO) -> gzip.GzipFile:
-    """What packs into an open file, the same bytes at all times."""
+    """A gzip writer into an open file, with reproducible bytes (no time stamp)."""
     return gzip.GzipFile(filename="", mode="wb", compresslevel=_LEVEL, fileobj=file, mtime=0)
 
 
 def _look_up(database: Database, clutch_id: str, run_id: str) -> tuple[int, RunDescription, tuple[str, ...]]:
-    """A stored run before its channels are read: its key, what is said of it, and the names of its channels."""
+    """A stored run without its channels: its key, its description for the response, and its channels' names."""
     with database.reading() as connection:
         row = repository.run(connection, clutch_id, run_id)
         lengths = raw_columns.lengths(connection, row.run_key)
@@ -176,7 +179,7 @@ def _values(database: Database, run_key: int, name: str) -> FloatArray:
 
 
 def _thinned(values: Values, names: tuple[str, ...], samples: int, points: int | None) -> Values:
-    """The channels of a plot; all values of plateaus and of short records."""
+    """The channels thinned for a plot; plateaus and short records keep all values."""
     if points is None or samples <= points or _TIME not in names:
         return values
     drawn = [name for name in names if name != _TIME]

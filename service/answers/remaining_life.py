@@ -38,7 +38,7 @@ NO_CRITERIA = b"[]"
 
 
 def criteria_of(database: Database, clutch_id: str) -> bytes:
-    """The criteria of a clutch's record as a JSON array, empty where mean COF alone counts. Raises NotFoundError."""
+    """The criteria of a clutch's record as a JSON array, empty if mean COF is the only one. Raises NotFoundError."""
     with database.reading() as connection:
         row = clutches.get(connection, clutch_id)
     if row is None:
@@ -111,7 +111,7 @@ def _predicted(
 def _with_held(
     database: Database, state: ClutchHistory, method: str, pressure_bar: float | None, at_cycles: float | None
 ) -> Mapping[str, Any]:
-    """Compute the prediction that counts the held runs too."""
+    """The prediction that also counts the held runs."""
     evidence = repository.evidence_for(database, state, repository.run_reader(database, state.clutch_id))
     if evidence is None:
         raise AssertionError("runs are held: the evidence was loaded")
@@ -119,7 +119,7 @@ def _with_held(
 
 
 def _criteria(prediction: LifePrediction) -> list[CriterionOutcome]:
-    """The one criterion of a stored prediction, as `criteria` lists it: mean COF, which is surely the first."""
+    """The `criteria` of a stored prediction: mean COF alone, which is certainly reached first."""
     criterion, current = prediction.criterion, prediction.current
     return [
         CriterionOutcome(
@@ -170,10 +170,11 @@ def life_by_criteria(
     criterion: str | None = None,
     life: int | None = None,
 ) -> RemainingLife:
-    """The remaining life by a clutch's criteria, by those of one `criterion`'s quantity, or by one `quantity` at a pressure.
+    """The remaining life by a clutch's criteria, by those of one `criterion`'s quantity, or by one `quantity` at a
+    pressure.
 
-    As it was at `at_cycles`, of the present life or of an earlier one by its number. Raises NotFoundError, and InvalidError
-    for a quantity that is none.
+    It is as of `at_cycles`, of the present life or an earlier one by its number. Raises NotFoundError, and InvalidError
+    for an unknown quantity.
     """
     with database.reading() as connection:
         row = repository.clutch(connection, clutch_id)
@@ -245,8 +246,8 @@ def _requested_criteria(
 
 
 def _usual(name: str, fraction: float, measured: MeasuredLife, pressure_bar: float | None) -> CriterionIn:
-    """What would end a life by a quantity that its clutch has no criterion on: its fraction, of a slope 0; at the lowest
-    pressure and frequency where it is measured, unless one is given."""
+    """The default criterion for a quantity on which the clutch's record has none: the record's fraction, or slope 0 for
+    a slope; at the lowest measured pressure and frequency unless a pressure is given."""
     quantity = quantity_named(name)
     tracks = measured.series(quantity)
     if not tracks:

@@ -51,7 +51,7 @@ _POINTS = 2000
 
 
 def page(database: Database, part: Part) -> RigPage:
-    """Profiles by name, fewer where so many would be too much memory."""
+    """A page of profiles by name; shorter than asked for if they would need too much memory."""
     part = replace(part, limit=min(part.limit, rigs.MAX_AT_ONCE))
     with database.reading() as connection:
         rows = rigs.page(connection, limit=part.most, after=part.name)
@@ -59,13 +59,13 @@ def page(database: Database, part: Part) -> RigPage:
 
 
 def rig_profile(database: Database, name: str) -> RigOut:
-    """One profile. Raises NotFoundError."""
+    """The profile with this name. Raises NotFoundError."""
     with database.reading() as connection:
         return repository.rig(connection, name)
 
 
 def is_saved(database: Database, name: str) -> bool:
-    """Whether there is a profile of this name."""
+    """Whether a profile has this name."""
     with database.reading() as connection:
         return rigs.get(connection, name) is not None
 
@@ -83,12 +83,12 @@ def preview(
     reading: Reading,
     beside: Sequence[str] = (),
 ) -> Preview:
-    """What would be made of a file by `profile`, by that of `rig`, or by the one whose columns it has; else by its titles,
-    and where these do not say all, by a suggestion. What `reading` says of columns, decimal sign and missing values comes
-    before either. `beside`: names of files that came with it.
+    """A preview of a file's channels, plateaus and fits. The file is read by `profile`, the profile of `rig`, or the
+    saved profile that has its columns; else by its column titles, completed by a suggestion if they do not suffice.
+    `reading` (columns, decimal sign, missing values) takes precedence. `beside`: names of files sent with it.
 
-    `clutch_id`: the clutch whose geometry and torque filter evaluate it, where it is registered already. Raises InvalidError
-    or TooLargeError where no table is found, NotFoundError where the rig is unknown.
+    `clutch_id`: a registered clutch with the geometry and torque filter for the evaluation. Raises InvalidError or
+    TooLargeError if no table is found, NotFoundError if the rig is unknown.
     """
     geometry, torque_filter = _clutch(database, clutch_id)
     if profile is None and rig is not None:
@@ -145,7 +145,7 @@ def preview(
 
 
 def _with_stated(used: RigProfile | None, shown: ShownTable, reading: Reading) -> RigProfile | None:
-    """A profile with what the request says besides: marks, the decimal sign, its map."""
+    """A profile updated by the request: missing and good marks, decimal sign, and column map."""
     if used is None:
         return None
     stated = {name: value for name in ("decimal", "missing", "good") if (value := getattr(reading, name))}
@@ -168,13 +168,14 @@ def _title(column: ShownColumn) -> str:
 
 
 def _first_of_each(columns: Sequence[ShownColumn]) -> list[int]:
-    """The indices of columns that have a title, the first of those of equal titles."""
+    """The indices of titled columns, only the first of columns with equal titles."""
     titles = [_title(column) if column["name"] else "" for column in columns]
     return [index for index, title in enumerate(titles) if title and titles.index(title) == index]
 
 
 def _fitting(database: Database, shown: ShownTable, filename: str) -> tuple[str | None, RigProfile | None]:
-    """The one profile that has the file's columns; of several, the one whose pattern has the file's name."""
+    """The one saved profile that has the file's columns; if several do, the one with a pattern matching the file's
+    name."""
     titles = [_title(column) for column in shown["columns"] if column["name"]]
     with database.reading() as connection:
         fitting = [repository.rig_out(row) for row in rigs.every(connection) if fits(row.content, titles)]
@@ -189,7 +190,8 @@ def _fitting(database: Database, shown: ShownTable, filename: str) -> tuple[str 
 
 
 def _by_titles(shown: ShownTable) -> RigProfile | None:
-    """The columns as their titles name them; None where no title is a channel's. A channel of two columns is left open."""
+    """The columns with the channels named by their titles; None if no title names a channel. A channel named by two
+    columns is left open."""
     channels = [column["channel"] for column in shown["columns"]]
     columns: dict[str, dict[str, object]] = {}
     for column, channel in zip(shown["columns"], channels, strict=True):
@@ -203,7 +205,7 @@ def _by_titles(shown: ShownTable) -> RigProfile | None:
 
 
 def _stated_without_column(reading: Reading) -> list[RigColumn]:
-    """The channels of a map that no column holds, as columns of a profile."""
+    """The mapped channels that have constants in place of columns, as columns of a profile."""
     return [
         RigColumn.model_validate({"title": choice.column, "channel": channel})
         for channel, choice in reading.mapping.items()
@@ -233,8 +235,8 @@ def _saveable(
     cycles: float | None,
     said: Suggested,
 ) -> RigProfile:
-    """The profile as it could be saved: with all columns, and what finds cycles and clutch: a pattern of the file's name, or
-    labels above the table."""
+    """The profile in a form that can be saved: with all columns, and with a source of cycles and clutch: a pattern of
+    the file's name, or labels above the table."""
     profile_columns = {column.title: RigColumn(**dict(column)) for column in used.columns} if used else {}
     profile_fields = {} if used is None else dict(used)
     in_cell = said.cycles_cell is not None and cycles in (None, said.named.cycles)
@@ -252,7 +254,7 @@ def _saveable(
 
 @dataclass(frozen=True, kw_only=True)
 class _Evaluated:
-    """What would be made of a file's channels, as a preview has it; `problem`: why it would be refused."""
+    """A file's channels, plateaus and fits for its preview; `problem`: why the file would be refused."""
 
     rows: int = 0
     kinds: list[FileKindName] = field(default_factory=list)
@@ -273,7 +275,7 @@ def _evaluated(
     geometry: Geometry,
     torque_filter: float,
 ) -> _Evaluated:
-    """The channels, what is cut of them and what is fitted; `problem` says why the file would be refused."""
+    """Evaluate a file for its preview: channels, plateaus and fits; `problem` says why the file would be refused."""
     answer = _Evaluated()
     if reading is None:
         return replace(answer, missing=list(NEEDED["stationary_stribeck"]))
@@ -310,7 +312,7 @@ def _drawn(columns: Mapping[str, FloatArray], samples: int) -> dict[str, list[fl
 
 
 def _pieces(run: IncomingRun, torque_filter: float) -> list[PreviewPiece]:
-    """The plateaus of a sampled stationary test, or the stretches of constant pressure of a dynamic one."""
+    """The plateaus of a sampled stationary test, or the constant-pressure stretches of a dynamic test."""
     if "time_s" not in run.channels:
         return []
     record = SampledChannels(run.channels)

@@ -25,9 +25,9 @@ LOOP_COLUMNS = (*Loop.model_fields, "run_id", "cycles")
 def page_as_json(
     database: Database, clutch_id: str, part: Part, state: str | None = None, kind: str | None = None
 ) -> bytes:
-    """Receipts by cycles, of runs in one state or all, of one kind or all, as JSON. Raises NotFoundError.
+    """A page of receipts by cycles as JSON, of runs in one state or all and of one kind or all. Raises NotFoundError.
 
-    A receipt's text goes out as it is stored, and what the run is now behind it.
+    The stored text of a receipt is sent unchanged, followed by the run's present state.
     """
     with database.reading() as connection:
         repository.clutch(connection, clutch_id)
@@ -57,13 +57,13 @@ def trail(database: Database, clutch_id: str, part: Part) -> ChangePage:
 
 
 def trail_rows(page: ChangePage) -> Iterator[Cells]:
-    """The audit trail as rows of a table; what changed is JSON."""
+    """The audit trail as rows of a table; `before` and `after` are JSON text."""
     for item in page.items:
         yield cells(item, TRAIL_COLUMNS) | {"before": to_text(item.before), "after": to_text(item.after)}
 
 
 def loops(database: Database, clutch_id: str, part: Part) -> LoopPage:
-    """Friction loops by cycles and pressure. Raises NotFoundError."""
+    """A page of friction loops by cycles and pressure. Raises NotFoundError."""
     with database.reading() as connection:
         repository.clutch(connection, clutch_id)
         rows = runs.page(connection, clutch_id, kind=DYNAMIC, state=runs.ACCEPTED)

@@ -33,7 +33,7 @@ _LOW, _HIGH = "0.05", "0.95"
 
 
 def scores_of_clutch(database: Database, clutch_id: str, method: MethodName) -> Scores:
-    """The scores of a clutch's lives that came to their end; NotFoundError for an unknown clutch."""
+    """The scores of predictions over a clutch's ended lives; NotFoundError for an unknown clutch."""
     with database.reading() as connection:
         state = repository.state(connection, clutch_id)
         rows = results.predictions_of(connection, clutch_id, method, ALL_PRESSURES)
@@ -49,7 +49,7 @@ def scores_of_clutch(database: Database, clutch_id: str, method: MethodName) -> 
 
 
 def scores_of_fleet(scored: Iterable[Scores], *, method: MethodName) -> FleetScores:
-    """All lives that came to their end, together and by stage of life, of what `scores_of_clutch` gives for each clutch."""
+    """The scores over all ended lives, overall and by stage of life, from each clutch's `scores_of_clutch`."""
     lives = [(clutch.clutch_id, life) for clutch in scored for life in clutch.items]
     tests = [test for _, life in lives for test in life.predictions]
     by_stage = {stage: [test for test in tests if abs(test.share_of_life - stage) <= HALF_STAGE] for stage in STAGES}
@@ -66,7 +66,7 @@ def scores_of_fleet(scored: Iterable[Scores], *, method: MethodName) -> FleetSco
 
 
 def end_of_life(life: Life, assumptions: Assumptions, fraction: float) -> float | None:
-    """The cycles since new at which the tests have passed the threshold; None where they have not."""
+    """The cycles since new at which the tests passed the threshold; None if they have not."""
     series = life.pooled(assumptions)
     if not series.measurements:
         return None
@@ -81,7 +81,7 @@ def end_of_life(life: Life, assumptions: Assumptions, fraction: float) -> float 
 
 
 def _predictions(life: Life, assumptions: Assumptions, fraction: float, method: str) -> dict[float, LifePrediction]:
-    """What a method whose predictions are not stored would have predicted at each test."""
+    """The predictions at each test, by cycles, of a method whose predictions are not stored."""
     predictions = {}
     for index, event in enumerate(life.events):
         if event.cofs:
@@ -112,7 +112,7 @@ def _scored(life: Life, assumptions: Assumptions, end: float, made: Mapping[floa
 
 
 def _test(prediction: LifePrediction, cycles: float, origin: float, end: float) -> ScoredPrediction:
-    """One prediction and how right it was; a quantile beyond the horizon is scored as if it were there."""
+    """One prediction with its errors; a quantile beyond the horizon is scored as if it were at the horizon."""
     remaining, length = prediction.remaining_cycles, end - origin
     horizon = origin + prediction.horizon_cycles
     ends = [horizon if value is None else value for value in prediction.end_of_life_cycles.values()]
@@ -134,7 +134,7 @@ def _test(prediction: LifePrediction, cycles: float, origin: float, end: float) 
 
 
 def summary(tests: Sequence[ScoredPrediction]) -> ScoreSummary:
-    """Means over predictions; null where there are none."""
+    """Mean scores over predictions; null if there are none."""
 
     def mean(name: str) -> float | None:
         return math.fsum(getattr(test, name) for test in tests) / len(tests) if tests else None
@@ -153,7 +153,7 @@ def _histogram(tests: Sequence[ScoredPrediction]) -> list[float]:
 
 
 def stage_rows(fleet: FleetScores) -> Iterator[Cells]:
-    """Means over the predictions of each stage of life as rows of a table, then over all."""
+    """Mean scores by stage of life as rows of a table; the last row is over all predictions."""
     for stage in fleet.stages:
         yield {"share_of_life": stage.share_of_life} | dict(stage)
     yield {"share_of_life": None} | dict(fleet.overall)

@@ -36,8 +36,9 @@ from storage.engine.database import Database
 
 
 def series(database: Database, clutch_id: str, part: Part, quantity: str | None) -> SeriesPage:
-    """Each quantity of each test by cycles, the slopes of its curves, those of each friction loop, the indicators of each
-    engagement, then the remaining cycles as they were predicted, and how many runs are held; of one quantity, or of all.
+    """The time series of a clutch, of one quantity or all: each quantity of each test by cycles, slopes of its curves,
+    quantities of friction loops, indicators of engagements, then the predicted remaining cycles; and the number of held
+    runs.
 
     Raises NotFoundError.
     """
@@ -70,13 +71,13 @@ COLUMNS = (
 
 
 def rows(page: SeriesPage) -> Iterator[Cells]:
-    """The same as rows of a table."""
+    """The time series as rows of a table."""
     return map(dict, page.items)
 
 
 @dataclass(frozen=True, slots=True)
 class _RunColumns:
-    """The run that rows are of."""
+    """The run's columns, the same in all its rows."""
 
     run_id: str
     cycles: float
@@ -97,7 +98,7 @@ class _RunColumns:
         frequency_hz: float | None = None,
         speed_rpm: float | None = None,
     ) -> SeriesItem:
-        """A value with its 90 % interval."""
+        """A row with a value and its 90 % interval."""
         return SeriesItem(
             cycles=self.cycles,
             time=self.time,
@@ -124,7 +125,7 @@ def _measured(run: _RunColumns, fit: Fit) -> Iterator[SeriesItem]:
 def _slopes(
     record: ClutchIn, receipts: Sequence[Receipt], levels: Mapping[str, Sequence[LevelFit]]
 ) -> Iterator[SeriesItem]:
-    """dμ/dv of every fitted curve, at the usual speeds and those of the clutch's criteria."""
+    """The slope dμ/dv of every fitted curve, at the usual speeds and those of the clutch's criteria."""
     geometry = record.geometry.to_model()
     limits = record.end_of_life.criteria
     speeds = sorted({*SLOPE_SPEEDS, *(limit.speed_rpm for limit in limits if limit.speed_rpm is not None)})
@@ -156,7 +157,8 @@ def _indicators(row: MeasuredEngagement) -> Iterator[SeriesItem]:
 
 
 def _predicted(cycles: float, prediction: LifePrediction) -> Iterator[SeriesItem]:
-    """What was predicted after a run; with too few tests the safe bound alone: mean COF stands among the measurements."""
+    """Rows of the prediction after a run: mean COF, health, remaining cycles, safe bound and probability of reaching
+    it. With too few tests mean COF is empty, because the measurements already show it."""
     current, remaining = prediction.current, prediction.remaining_cycles
     mean, sd = current.mean_cof, current.mean_cof_sd
     if mean is None or sd is None or prediction.status == INSUFFICIENT:
@@ -174,7 +176,7 @@ def _predicted(cycles: float, prediction: LifePrediction) -> Iterator[SeriesItem
 def _ahead_row(
     cycles: float, quantity: str, unit: str, value: float | None, lower: float | None = None, upper: float | None = None
 ) -> SeriesItem:
-    """A row of no test: over all pressures, at cycles since new."""
+    """A row of a prediction, which has no run: over all pressures, at cycles since new."""
     return SeriesItem(
         cycles=whole(cycles),
         time=None,

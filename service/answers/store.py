@@ -42,7 +42,8 @@ _GOES_ON = re.compile(rb'"next":"([A-Za-z0-9_-]+)"\}$')
 
 
 def build_of(folders: Iterable[Path]) -> str:
-    """The release, and a digest of the code in these folders and of the numerical libraries, by which two builds differ."""
+    """The release with a digest of the code in these folders and of the numerical libraries; it differs between any two
+    builds."""
     digest = hashlib.sha256(f"numpy {version('numpy')} scipy {version('scipy')}".encode())
     for folder in folders:
         for path in sorted(folder.rglob("*.py")):
@@ -56,7 +57,7 @@ BUILD = build_of(Path(__file__).parents[2] / name for name in ("models", "storag
 
 @dataclass(frozen=True, slots=True)
 class CsvPage:
-    """The bytes of a page as CSV, which has no place for the next one's cursor, and that cursor, None on the last page."""
+    """A page as CSV bytes, and the cursor of the next page, for which CSV has no place (None on the last page)."""
 
     body: bytes
     next: str | None
@@ -64,7 +65,7 @@ class CsvPage:
 
 @dataclass(frozen=True, slots=True)
 class CachedAnswer:
-    """An answer's bytes, the strong entity tag that follows from them, and the cursor of the next page where one follows."""
+    """A response body, its strong entity tag, and the next page's cursor if there is one."""
 
     body: bytes
     tag: str
@@ -72,12 +73,12 @@ class CachedAnswer:
 
     @property
     def size(self) -> int:
-        """Bytes that it takes where it is kept: the empty ones of many keys take room too."""
+        """The bytes counted against the cache's limit; even an empty answer counts, because its key takes room."""
         return len(self.body) + KEPT_BESIDE_BYTES
 
     @classmethod
     def of(cls, made: bytes | CsvPage) -> "CachedAnswer":
-        """The answer with its tag. The tag of a page covers its cursor, which is not in its bytes."""
+        """The answer with its entity tag. A page's tag covers its cursor, which is not in its bytes."""
         if isinstance(made, CsvPage):
             digest = hashlib.sha256(made.body + (made.next or "").encode())
             return cls(made.body, f'"{digest.hexdigest()[:32]}"', made.next)
@@ -86,19 +87,20 @@ class CachedAnswer:
 
 
 def to_json(answer: BaseModel) -> bytes:
-    """The one encoder of answers: JSON in UTF-8, fields in their order; ValueError on a number that JSON cannot carry."""
+    """The JSON of any answer: UTF-8, fields in their declared order; ValueError on a number that JSON cannot represent."""
     return to_text(answer.model_dump(mode="json", exclude_unset=isinstance(answer, Answer))).encode()
 
 
 def name_of(query: Callable[..., object]) -> str:
-    """The name of a query in the cache: its module and function."""
+    """A query's name in the cache: module and function."""
     return f"{query.__module__}.{query.__qualname__}"
 
 
 def revision_and_json(
     database: Database, query: Callable[..., BaseModel], clutch_id: str, arguments: tuple[Hashable, ...]
 ) -> tuple[int, bytes]:
-    """A clutch's revision, and what `query(database, clutch_id, *arguments)` gives at that or a later one, as JSON.
+    """The JSON of `query(database, clutch_id, *arguments)`, and the clutch's revision from which it was computed, at
+    the least.
 
     Where several services share the database, what one of them computed without `arguments` is not computed again.
     """
@@ -119,7 +121,8 @@ def revision_and_json(
 
 
 def shared_answer(database: Database, query: Callable[..., object], clutch_id: str) -> tuple[int, bytes] | None:
-    """What a service on this database computed last without arguments, and its revision; None where it cannot be read."""
+    """The newest shared answer of a query without arguments, and its revision; None if there is none or it cannot be
+    read."""
     try:
         newest = database.shared_answer(clutch_id, name_of(query), BUILD)
     except StorageError as error:
@@ -137,10 +140,10 @@ Again: TypeAlias = "Callable[[Request], Response | None]"
 
 
 class AnswerStore:
-    """The last answers; the least lately asked for goes first. `most_bytes` bounds their sizes together.
+    """A cache of answers, bounded by `most_bytes`; the least recently requested is dropped first.
 
-    Of each key the answer of one version is held, that whose making began last: one that was superseded is not asked for
-    again. What a worker is renewing stays: its last answer is given meanwhile.
+    Each key has one version: the one whose computation began last. An answer that a worker is renewing is never
+    dropped, because requests get it meanwhile.
     """
 
     def __init__(self, most_bytes: int, database: Database | None = None) -> None:
@@ -160,12 +163,12 @@ class AnswerStore:
         self._asked: OrderedDict[Hashable, Again] = OrderedDict()
 
     def held(self, key: Hashable, version: Hashable) -> CachedAnswer | None:
-        """The answer for `key` where it is there and of `version`."""
+        """The cached answer for `key` at exactly `version`, else None."""
         with self._lock:
             return self._current(key, version)
 
     def newest(self, key: Hashable) -> tuple[Any, CachedAnswer] | None:
-        """The answer for `key`, of whichever version, and that version; None where none is there."""
+        """The cached answer for `key` at any version, with that version; None if there is none."""
         with self._lock:
             if key not in self._answers:
                 return None
@@ -173,13 +176,14 @@ class AnswerStore:
             return self._answers[key][:2]
 
     def put(self, key: Hashable, version: Hashable, answer: CachedAnswer) -> None:
-        """Hold an answer that was made elsewhere, in place of what there was."""
+        """Cache an answer computed elsewhere, replacing the present one."""
         with self._lock:
             self._begun += 1
             self._hold(key, version, answer, self._begun)
 
     def answer(self, key: Hashable, version: Hashable, make: Callable[[], bytes | CsvPage]) -> CachedAnswer:
-        """The answer for `key` and `version`, made by `make` where it is not there. All who wait get what that raises."""
+        """The answer for `key` at `version`, computed by `make` if it is not cached. Concurrent requests share one
+        computation and its error."""
         with self._lock:
             cached = self._current(key, version)
             if cached is not None:
@@ -238,24 +242,24 @@ class AnswerStore:
             self._held -= self._answers.pop(key)[1].size
 
     def knows(self, key: Hashable) -> bool:
-        """Whether an answer is held, of whichever revision, or is being made."""
+        """Whether an answer for the key is cached, at any revision, or being computed."""
         return self._is_renewed(key) or self.newest(key) is not None
 
     def begin(self, key: Hashable, revision: int, body: bytes) -> None:
-        """Hold an answer that was made elsewhere, where none is known."""
+        """Cache an answer computed elsewhere, unless the key has one already."""
         if not self.knows(key):
             self.put(key, revision, CachedAnswer.of(body))
 
     def begin_shared(self, key: Hashable, query: Callable[..., object], clutch_id: str) -> None:
-        """Hold what a service on this database has computed last of a query without arguments, where nothing is known."""
+        """Cache the newest shared answer of a query without arguments, unless the key has one already."""
         if self._database is not None and not self.knows(key):
             shared = shared_answer(self._database, query, clutch_id)
             if shared is not None:
                 self.begin(key, *shared)
 
     async def renewed(self, key: Hashable, revision: int, compute: Compute, *, wait: float) -> tuple[int, CachedAnswer]:
-        """The answer at `revision` or later, or the last one where it is not there within `wait` [s]; and its revision. As
-        stale-while-revalidate of RFC 5861; used from the event loop alone.
+        """The answer at `revision` or later, or the previous one if it is not ready within `wait` [s]; and its
+        revision. As stale-while-revalidate of RFC 5861; used from the event loop alone.
 
         Where none was ever made, it is waited for. `compute` is told whether who asks waits; what it raises is raised to
         those who do.
@@ -286,7 +290,7 @@ class AnswerStore:
         return newest
 
     def _begin(self, key: Hashable, compute: Compute, *, waits: bool) -> _Making:
-        """Have the next answer made, for one who waits or for later. Raises BusyError."""
+        """Start computing the next answer, with priority if a request `waits` for it. Raises BusyError."""
         tasks = self._waited_for if waits else self._renewing
         task = tasks[key] = asyncio.create_task(self._computed(key, compute(waits), tasks))
         task.add_done_callback(_logged)
@@ -310,13 +314,13 @@ class AnswerStore:
         return key in self._waited_for or key in self._renewing
 
     def remember(self, asked: Hashable, again: Again, most: int) -> None:
-        """Answer what was asked by `again` from now on, for what was asked for last, at `most` so many."""
+        """Have later requests equal to `asked` answered by `again`; only the `most` recently used requests are kept."""
         self._asked[asked] = again
         while len(self._asked) > most:
             self._asked.popitem(last=False)
 
     def again(self, asked: Hashable) -> "Again | None":
-        """What answers what was asked before, None where it was not."""
+        """The function that answers a remembered request; None if the request is not remembered."""
         return self._asked.get(asked)
 
 

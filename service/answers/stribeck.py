@@ -46,7 +46,8 @@ from storage.runs import RunRow
 
 
 def curves(database: Database, clutch_id: str, part: Part) -> StribeckPage:
-    """Stationary tests by cycles with their fits and pressure laws, of the open clutch neither. Raises NotFoundError."""
+    """A page of stationary tests by cycles with fits and pressure laws; tests of the open clutch have neither. Raises
+    NotFoundError."""
     with database.reading() as connection:
         repository.clutch(connection, clutch_id)
         rows = runs.page(connection, clutch_id, limit=part.most, after=part.after, fitted=True, state=runs.ACCEPTED)
@@ -61,7 +62,7 @@ def curves(database: Database, clutch_id: str, part: Part) -> StribeckPage:
 
 
 def rows(page: StribeckPage) -> Iterator[Cells]:
-    """Fitted curves as rows of a table, a row a test and pressure."""
+    """Fitted curves as rows of a table, one row per test and pressure."""
     names = [name for name in Fit.model_fields if name not in ("parameters", "standard_errors", "undetermined")]
     for item in page.items:
         for fit in item.fits:
@@ -82,7 +83,7 @@ def _item(row: RunRow, levels: Sequence[LevelFit]) -> StribeckItem:
 
 
 def _laws(laws: PressureLaws, covariances: Mapping[str, FloatArray]) -> PressureLawsOut:
-    """The pressure laws in bar, by public name."""
+    """The pressure laws in bar, by their names in the answer."""
     return PressureLawsOut.model_validate(
         {public: _law(getattr(laws, name), covariances[name]) for name, (public, _) in PARAMETER_UNITS.items()}
     )
@@ -106,7 +107,7 @@ CYCLES, PRESSURES, SPEEDS = 15, 13, 20
 
 
 def surface(database: Database, clutch_id: str) -> Surfaces:
-    """`/surfaces` of a clutch as it is now. Raises NotFoundError."""
+    """The answer to `/surfaces` of the present life. Raises NotFoundError."""
     with database.reading() as connection:
         state, levels = repository.state(connection, clutch_id), repository.levels(connection, clutch_id)
     assumptions = state.assumptions
@@ -134,7 +135,8 @@ def surface(database: Database, clutch_id: str) -> Surfaces:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SurfaceGrids:
-    """Parameters [4, k, p] over cycles [k] by pressure [p, Pa], torque [k, p, v, Nm] over speed [v, rad/s] too."""
+    """Grids of parameters [4, k, p] over cycles [k] and pressure [p, Pa], and of torque [k, p, v, Nm], also over speed
+    [v, rad/s]."""
 
     cycles: FloatArray
     pressure: FloatArray
@@ -146,8 +148,8 @@ class SurfaceGrids:
 def surface_grids(
     lives: Sequence[Life], assumptions: Assumptions, fits: Mapping[str, Sequence[LevelFit]], geometry: Geometry
 ) -> SurfaceGrids:
-    """Parameters over cycles [k] by pressure [p], torque over cycles, pressure and speed [v], of the present life; with too
-    few tests for a track at the cycles of these alone. Raises NotFoundError before a test determines all parameters."""
+    """Parameters over cycles [k] and pressure [p], and torque also over speed [v], of the present life; with too few
+    tests for a track, at the tests' own cycles. Raises NotFoundError before a test determines all parameters."""
     speed_range = lives[-1].speed_range if lives else None
     if speed_range is None:
         raise NotFoundError("there are no surfaces, because this life has no stationary test: send one")
@@ -177,7 +179,7 @@ def surface_grids(
 
 
 def surface_rows(answer: Surfaces) -> Iterator[Cells]:
-    """The surfaces as rows of a table, a row a count of cycles, a pressure and a speed."""
+    """The surfaces as rows of a table, one row per cycles, pressure and speed."""
     for i, cycles in enumerate(answer.cycles):
         for j, pressure in enumerate(answer.pressure_bar):
             for k, speed in enumerate(answer.speed_rpm):

@@ -36,8 +36,8 @@ from storage.tables import CHECKSUM, metadata, run
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Checked:
-    """What was found, a sentence each; how many runs, inspections and photographs were checked; and how many results earlier
-    releases made, by release: these are only recomputed."""
+    """The findings of a check, one sentence each; the numbers of runs, inspections and photographs checked; and the
+    numbers of results by earlier releases, which are recomputed but not compared."""
 
     findings: tuple[str, ...]
     runs: int = 0
@@ -47,9 +47,9 @@ class Checked:
 
 
 def check(database: Database, clutch_id: str, *, recompute: bool) -> Checked:
-    """All of a clutch; its results computed again where asked for, and where all that they follow from is whole.
+    """Check all data of a clutch; on request also recompute its results, if their input is undamaged.
 
-    Whatever a damaged value leads to is a finding: the next clutch is to be checked too.
+    Any error caused by damaged data becomes a finding, so that the next clutch is still checked.
     """
     content = _Sum()
     for part in (check_rows, check_runs, check_inspections):
@@ -60,7 +60,7 @@ def check(database: Database, clutch_id: str, *, recompute: bool) -> Checked:
 
 
 class _Sum:
-    """What several checks have found."""
+    """The sum of several checks."""
 
     def __init__(self) -> None:
         self.findings: tuple[str, ...] = ()
@@ -93,7 +93,8 @@ def check_rows(database: Database, clutch_id: str) -> Checked:
 
 
 def check_other_rows(database: Database) -> Checked:
-    """Every row that is of no clutch against its checksum: priors of fleets, rig profiles, rules and receivers of alarms."""
+    """Check the rows that belong to no clutch against their checksums: fleet priors, rig profiles, alarm rules and
+    receivers."""
     with database.reading() as connection:
         found = _unreadable(connection, {table: sa.true() for table in _tables(of_clutches=False)})
     return Checked(findings=tuple(found))
@@ -110,7 +111,7 @@ def _unreadable(connection: Connection, chosen: Mapping[sa.Table, sa.ColumnEleme
 
 
 def _tables(*, of_clutches: bool) -> list[sa.Table]:
-    """The tables that have checksums; a rule of alarms may be of no clutch."""
+    """The tables with checksums; an alarm rule may belong to no clutch."""
     sealed = [table for table in metadata.sorted_tables if CHECKSUM in table.c]
     return [
         t for t in sealed if (t.name != "alarm" and bool({"clutch_id", "run_key"} & set(t.c.keys()))) is of_clutches
@@ -124,7 +125,7 @@ def _of_clutch(table: sa.Table, clutch_id: str) -> sa.ColumnElement[bool]:
 
 
 def check_runs(database: Database, clutch_id: str) -> Checked:
-    """Every run of a clutch against the hash that its sender was given; one run in memory at a time."""
+    """Check every run of a clutch against the hash in its receipt, one run in memory at a time."""
     with database.reading() as connection:
         allow_damage(connection, everywhere=True)  # `check_rows` finds it
         rows = runs.page(connection, clutch_id)
@@ -181,7 +182,7 @@ _Results = Mapping[str, tuple[str, Any]]
 
 
 def check_results(database: Database, clutch_id: str) -> Checked:
-    """All results of a clutch computed again and compared; those of earlier releases need not be the same."""
+    """Recompute all results of a clutch and compare them; results of earlier releases may differ."""
     while True:
         with database.reading() as connection:
             state = repository.state(connection, clutch_id)
@@ -245,12 +246,12 @@ def _prediction(method: str, cycles: float) -> str:
 
 
 def _plain(result: Any) -> Any:
-    """As it is after it has been stored."""
+    """The value as it reads back from the database."""
     return json.loads(to_text(result))
 
 
 def _difference(stored: Any, again: Any, place: str = "") -> str | None:
-    """The first place where two results differ by more than the last digits, with both values; None where none does."""
+    """The first place where two results differ by more than rounding, with both values; None if they agree."""
     if isinstance(stored, dict) and isinstance(again, dict) and stored.keys() == again.keys():
         pairs = [(stored[name], again[name], f"{place}/{name}") for name in stored]
     elif isinstance(stored, list) and isinstance(again, list) and len(stored) == len(again):
@@ -267,7 +268,7 @@ def _are_numbers(*values: Any) -> bool:
 
 
 def check_inspections(database: Database, clutch_id: str) -> Checked:
-    """Every inspection of a clutch and every photograph of it against its hash; one photograph in memory at a time."""
+    """Check every inspection of a clutch and every photograph against its hash, one photograph in memory at a time."""
     with database.reading() as connection:
         allow_damage(connection, everywhere=True)
         rows = inspections.page(connection, clutch_id)

@@ -92,7 +92,7 @@ class AlarmIn(base.Schema):
 
     @model_validator(mode="after")
     def _complete(self) -> Self:
-        """A limit on the side that the quantity is watched at, and nothing that says nothing."""
+        """The rule, with a limit on the side that its quantity needs, and no field that has no effect; else ValueError."""
         side, usual = LIMITS.get(self.quantity, (None, None))
         for name in ("below", "above"):
             value = getattr(self, name)

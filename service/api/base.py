@@ -103,7 +103,7 @@ _KINDS_OF_VALUES = (
 
 
 def rule_in_words(kind: str, message: str) -> str:
-    """The rule that a value breaks, of pydantic's kind of error and message, for users who never saw the schema."""
+    """The rule that a value breaks, in plain words, from pydantic's kind of error and message."""
     if kind == "extra_forbidden":
         return "no such field"
     if kind in ("missing", "union_tag_not_found"):
@@ -140,7 +140,7 @@ Identifier = Annotated[str, StringConstraints(pattern=IDENTIFIER_PATTERN)]
 
 
 def _one_line(text: str, info: ValidationInfo) -> str:
-    """The text, refused in a request if it does not stand in one line; what is stored already stays readable."""
+    """The text; a request must send it as one line, while stored texts with several lines stay readable."""
     if info.mode == "json" and not re.fullmatch(LINE_PATTERN, text):
         raise ValueError("must be one line of text without control characters")
     return text
@@ -179,7 +179,7 @@ Reason = Annotated[str, StringConstraints(max_length=LONGEST_REASON, strip_white
 
 
 def _as_computed(number: float, checked: Callable[[float], float]) -> float:
-    """The number as it was given: a whole one that was computed as such stays one."""
+    """The checked number; an integer stays an integer."""
     as_float = checked(number)
     return number if type(number) is int else as_float
 
@@ -194,7 +194,8 @@ Next = Annotated[str | None, Field(description="The `cursor` of the next page; n
 
 
 def of_row(answer: type[Row], row: object, **own: Any) -> Row:
-    """A stored row as the answer has it, field by field; `own` are those that the row calls otherwise or has not."""
+    """An answer made from a stored row, field by field; `own` gives fields with another name in the row or missing from
+    it."""
     return answer(**{name: own[name] if name in own else getattr(row, name) for name in answer.model_fields})
 
 

@@ -121,7 +121,7 @@ class ClutchIn(base.Schema):
 
     @property
     def torque_filter(self) -> float:
-        """Time constant of the torque channel's low-pass [s], 0 where none is declared."""
+        """The time constant of the torque channel's low-pass [s], 0 if none is declared."""
         return 0.0 if self.torque_filter_ms is None else self.torque_filter_ms / 1000
 
 
@@ -152,7 +152,7 @@ class ClutchEdit(base.Schema):
         return self
 
     def fields(self) -> dict[str, JsonValue]:
-        """The fields of the record that were given, as JSON."""
+        """The given fields of the record, as JSON."""
         sent = self.model_fields_set - {"reason", "archived"}
         return self.model_dump(mode="json", include=sent)
 

@@ -132,6 +132,6 @@ _EXAMPLES = _OWN | {name: value for value, names in _SHARED for name in names.sp
 
 
 def example_of(owner: str, name: str) -> Any:
-    """The example of a field or parameter of that name; None where there is none."""
+    """The example of the field or parameter of that name; None if there is none."""
     ending = name[name.rfind("_") :] if "_" in name else ""
     return _EXAMPLES.get(f"{owner}.{name}", _EXAMPLES.get(name, _EXAMPLES.get(ending)))

@@ -63,7 +63,8 @@ class CriterionIn(Schema):
     @model_validator(mode="before")
     @classmethod
     def _has_a_limit(cls, given: Any) -> Any:
-        """A slope's limit is 0, where friction begins to fall with speed, and mean COF's half of what it was."""
+        """The criterion with a default limit: 0 for a slope, where friction begins to fall with speed; half of its
+        initial value for mean COF."""
         if not isinstance(given, dict) or not isinstance(given.get("quantity"), str):
             return given
         named: str = given["quantity"]
@@ -382,7 +383,7 @@ class PlannedBlock(Schema):
 
     @model_validator(mode="after")
     def _complete(self) -> "PlannedBlock":
-        """What says nothing without another field is refused with a reason, rather than left out in silence."""
+        """The block; ValueError with a reason if a field has no effect without another field."""
         if self.sd > 0.0 and self.energy_per_cycle_kj is None:
             raise ValueError("sd needs energy_per_cycle_kj: it is the standard deviation of this energy")
         if self.sd > (self.energy_per_cycle_kj or 0.0):

@@ -21,7 +21,7 @@ from storage.engine.database import Database
 
 
 def adopt(database: Database, clutch_id: str, diagnosis_id: str | None, adopted_at: str, by: str = "local") -> None:
-    """Adopt a diagnosis's extension, or return to the baseline, as `by` asked for; all is tracked again.
+    """Adopt a diagnosis's extension, or return to the baseline, in the name of `by`; the clutch is then tracked again.
 
     What is in force already stays and makes no version. Raises NotFoundError for an unknown clutch or diagnosis,
     NothingToAdoptError where there is nothing to adopt or another life was diagnosed; then nothing was written.
@@ -49,10 +49,10 @@ def finish_and_adopt(
     *,
     claimer: str,
 ) -> bool:
-    """Store a finished diagnosis and, in the same transaction, adopt its extension; False where there is nothing to adopt.
+    """Store a finished diagnosis and adopt its extension in the same transaction; false, with nothing stored, if there
+    is nothing to adopt.
 
-    `ended` holds the `report` and the `extension` (or None) as the diagnosis made them, `claimer` is the process whose job
-    it is. Where False is answered, nothing was stored.
+    `ended` holds the diagnosis's `report` and `extension` (or None); `claimer` is the process that holds the job.
     """
     if ended["extension"] is None:
         return False
@@ -84,7 +84,7 @@ def _change(
     by: str,
     before: Callable[[Connection], None] | None = None,
 ) -> None:
-    """Compute under the new model and store, again where the clutch has changed meanwhile."""
+    """Compute results under the new model and store them; repeat if the clutch was changed meanwhile."""
     diagnosis_id = None if adoption is None else adoption.diagnosis_id
     for _ in repository.attempts(clutch_id):
         state, results = _computed(database, clutch_id, adoption)
@@ -109,7 +109,7 @@ def _change(
 
 
 def _computed(database: Database, clutch_id: str, adoption: Adoption | None) -> tuple[ClutchHistory, Results]:
-    """The clutch as it would be tracked; raises NothingToAdoptError where another life was diagnosed."""
+    """The clutch's results under the new model; raises NothingToAdoptError if the diagnosis is of another life."""
     extension = None if adoption is None else adoption.extension
     with database.reading() as connection:
         state = repository.state(connection, clutch_id, also=extension)
@@ -121,7 +121,8 @@ def _computed(database: Database, clutch_id: str, adoption: Adoption | None) -> 
 
 
 def _in_force(connection: Connection, clutch_id: str, diagnosis_id: str | None) -> bool:
-    """Whether this was adopted last, of what is of lives in the history; None: a return to the baseline."""
+    """Whether this diagnosis's model is the newest adopted one of the lives in the history; `diagnosis_id` None:
+    whether the baseline is."""
     if diagnosis_id is None:
         newest = assumptions.current_adoption(connection, clutch_id)
         return newest is None or newest.diagnosis_id is None

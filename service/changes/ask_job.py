@@ -17,9 +17,9 @@ from storage.jobs import JobRow
 def ask(
     database: Database, kind: str, clutch_id: str | None, *, by: str, request: str, most: int, asked_at: str
 ) -> JobRow:
-    """Ask for a job of a kind, of a clutch or None: of all; where the same waits or runs already it is that one.
+    """Queue a job of a kind, for a clutch or None: all; if the same job already waits or runs, that one is returned.
 
-    `request` is the id of the request that asks. Raises NotFoundError, BusyError where `most` of the kind wait or run.
+    `request`: the id of the asking request. Raises NotFoundError, and BusyError if `most` jobs of the kind wait or run.
     """
     with database.writing(of=kind) as connection:  # who asks for one of the same kind meanwhile waits
         if clutch_id is not None:
@@ -45,9 +45,9 @@ def ask(
 
 
 def finish(database: Database, job: JobRow, ended: Mapping[str, Any], *, at: str) -> None:
-    """Store how a claimed job ended: its `result`, with how far it had come, or its `problem`.
+    """Store how a claimed job ended: its `result` with its last progress, or its `problem`.
 
-    Nothing is stored of a job that is no longer the claimer's: it was cancelled, or another does it.
+    Nothing is stored if the job is no longer the claimer's, because it was cancelled or claimed by another service.
     """
     problem = ended.get("problem")
     progress = None if problem is not None else ended["progress"] | {"result": ended["result"]}
@@ -57,9 +57,9 @@ def finish(database: Database, job: JobRow, ended: Mapping[str, Any], *, at: str
 
 
 def cancel(database: Database, row: JobRow, *, by: str, at: str) -> JobRow:
-    """Cancel a job in the name of `by`, and with it the diagnosis of that name, if it is one's; returns it as it is then.
+    """Cancel a job, and the diagnosis it makes if any, in the name of `by`; returns its new state.
 
-    One that has ended stays as it is. Raises NotFoundError.
+    A job that has ended is left unchanged. Raises NotFoundError.
     """
     problem = f"cancelled by {by}"
     with database.writing(of=row.clutch_id) as connection:

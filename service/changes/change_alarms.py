@@ -14,10 +14,10 @@ from storage.webhooks import WebhookRow
 
 
 def save(database: Database, rule: AlarmIn, *, by: str, at: str, alarm_id: str | None = None) -> tuple[AlarmRow, bool]:
-    """Save a rule, new or (`alarm_id`) in the place of another; as it is in force, and whether it is new.
+    """Save a rule, new or in place of `alarm_id`; returns the rule in force and whether it is new.
 
-    A rule that is there already under any name is not made twice. Raises NotFoundError for an unknown clutch or rule,
-    NotPossibleNowError where there are MAX_RULES beside it.
+    A rule equal to a saved one is not added. Raises NotFoundError for an unknown clutch or rule, NotPossibleNowError if
+    MAX_RULES others exist.
     """
     content = rule.model_dump(mode="json")
     with database.writing() as connection:
@@ -50,7 +50,7 @@ def save(database: Database, rule: AlarmIn, *, by: str, at: str, alarm_id: str |
 
 
 def remove(database: Database, alarm_id: str) -> None:
-    """Delete a rule: what it has raised is cleared, and stays listed. Raises NotFoundError."""
+    """Delete a rule; its alarms are cleared and stay listed. Raises NotFoundError."""
     with database.writing() as connection:
         found(alarms.get(connection, alarm_id), "alarm", alarm_id)
         concerned = [event.clutch_id for event in alarms.open_of_alarm(connection, alarm_id)]
@@ -60,7 +60,8 @@ def remove(database: Database, alarm_id: str) -> None:
 
 
 def acknowledge(database: Database, event_id: str, *, note: str, by: str, at: str) -> EventOut:
-    """Note that `by` has seen an alarm; what was acknowledged or is over already stays as it is. Raises NotFoundError."""
+    """Acknowledge a raised alarm in the name of `by`; an acknowledged or cleared alarm is left unchanged. Raises
+    NotFoundError."""
     with database.writing() as connection:
         row = found(alarms.event(connection, event_id), "event of an alarm", event_id)
         if row.state == alarms.RAISED:
@@ -69,7 +70,7 @@ def acknowledge(database: Database, event_id: str, *, note: str, by: str, at: st
 
 
 def test(database: Database, alarm_id: str) -> list[str]:
-    """Put a test into the outbox of each of a rule's receivers; the names of the deliveries. Raises NotFoundError."""
+    """Queue a test delivery to each receiver of a rule; returns the ids of the deliveries. Raises NotFoundError."""
     with database.writing() as connection:
         row = found(alarms.get(connection, alarm_id), "alarm", alarm_id)
         receivers = raising.receivers_of(connection, row.clutch_id)
@@ -101,7 +102,7 @@ def remove_receiver(database: Database, webhook_id: str) -> None:
 
 
 def test_receiver(database: Database, webhook_id: str, *, at: str) -> list[str]:
-    """Put a test into a receiver's outbox; the name of the delivery. Raises NotFoundError."""
+    """Queue a test delivery to a receiver; returns its id. Raises NotFoundError."""
     with database.writing() as connection:
         row = found(webhooks.get(connection, webhook_id), "webhook", webhook_id)
         rule = AlarmIn(clutch_id=row.content["clutch_id"], quantity="held_runs", name="test")
@@ -117,7 +118,7 @@ def test_receiver(database: Database, webhook_id: str, *, at: str) -> list[str]:
 
 
 def inside_allowed(database: Database, setting: bool | None) -> bool:
-    """Whether receivers may be within this machine or a private network: as it is set, else while no key was ever made."""
+    """Whether receivers may have addresses on this machine or a private network: as set, else only while no key exists."""
     if setting is not None:
         return setting
     with database.reading() as connection:

@@ -52,7 +52,7 @@ from storage.runs import RunRow
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Request:
-    """What is asked for, of which runs, by whom, when and why; `cycles` by run_id where runs are corrected."""
+    """A change of runs as requested: its action, reason, author and time; `cycles` by run_id for corrected runs."""
 
     clutch_id: str
     run_ids: tuple[str, ...]
@@ -65,8 +65,8 @@ class _Request:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Loaded:
-    """Runs and their clutch at one revision: `state` holds those that are accepted, `events` are all of them in the order of
-    the history, `rows` too."""
+    """Runs to be changed and their clutch, at one revision: `state` has the accepted runs; `events` and `rows` are the
+    runs to be changed, in the order of the history."""
 
     rows: tuple[RunRow, ...]
     events: tuple[Event, ...]
@@ -88,14 +88,14 @@ class _Loaded:
 
     @property
     def others(self) -> ClutchHistory:
-        """The clutch's state without the runs that are being changed, whether they were accepted or held."""
+        """The clutch's history without the runs being changed, both accepted and held."""
         names = {event.run_id for event in self.events}
         events = tuple(event for event in self.state.events if event.run_id not in names)
         held = tuple(event for event in self.state.held if event.run_id not in names)
         return replace(self.state, events=events, held=held)
 
     def reader(self, database: Database) -> RunReader:
-        """The clutch's runs, this one as its file is read again."""
+        """A reader of the clutch's runs; a run whose file is being read again is given in its new form."""
         stored = repository.run_reader(database, self.state.clutch_id)
         return stored if self.again is None else reader_with(stored, self.again)
 
@@ -129,10 +129,10 @@ def change(
 def read_again(
     database: Database, clutch_id: str, run_id: str, folder: Path, *, rig: str, reason: str, by: str, at: str
 ) -> Receipt:
-    """Read a run's file again, by another rig's profile or by one that was mended, where doubts are asked again; returns its
-    receipt. The file is unpacked below `folder`.
+    """Read a run's file again, by another or a mended rig profile; the run is judged again. Returns its receipt. The
+    file is unpacked below `folder`.
 
-    Raises NotFoundError, NotPossibleNowError for a run that is withdrawn or has no file, and as reading does.
+    Raises NotFoundError, NotPossibleNowError for a run that is withdrawn or has no file, and the errors of reading.
     """
     with database.reading() as connection:
         row = repository.run(connection, clutch_id, run_id)
@@ -195,7 +195,7 @@ def _change(
 
 
 def _with(loaded: _Loaded, run: IncomingRun) -> _Loaded:
-    """A run and its clutch, the run as its file is read again. Raises InvalidError where it cannot be evaluated so."""
+    """A run as newly read from its file, with its clutch. Raises InvalidError if the new form cannot be evaluated."""
     analysis = analyse(run, loaded.state.geometry, loaded.state.record.torque_filter)
     run_id, received_at = run.run_id, loaded.row.received_at
     answer = receipt(loaded.row.clutch_id, run, analysis, received_at=received_at)
@@ -234,7 +234,7 @@ def _load(database: Database, request: _Request) -> _Loaded:
 
 
 def _as_asked(database: Database, loaded: _Loaded, request: _Request) -> tuple[RunRow, ...]:
-    """The runs as they are asked for; each as it is where that changes nothing."""
+    """The runs in the requested states; an unaffected run is returned unchanged."""
     if request.action == changes.CONFIRM:
         return tuple(replace(row, state=runs.ACCEPTED) if row.state == runs.HELD else row for row in loaded.rows)
     if request.action == changes.WITHDRAW:
@@ -254,7 +254,7 @@ def _as_asked(database: Database, loaded: _Loaded, request: _Request) -> tuple[R
 
 
 def _judged(database: Database, loaded: _Loaded, cycles: Sequence[float]) -> tuple[RunRow, ...]:
-    """The runs at other cycles, all of them judged together: accepted where they are plausible there, else held."""
+    """The runs at their new cycles, judged together: accepted if plausible there, else held."""
     other_runs, alone = loaded.others, dict[str, tuple[Notice, ...]]()
     events = []
     for row, event, at in zip(loaded.rows, loaded.events, cycles, strict=True):
@@ -278,7 +278,7 @@ def _judged(database: Database, loaded: _Loaded, cycles: Sequence[float]) -> tup
 
 
 def _alone(database: Database, loaded: _Loaded, row: RunRow, cycles: float) -> tuple[Shown | None, tuple[Notice, ...]]:
-    """What a run at other cycles shows, and what is odd about it by itself."""
+    """A run's friction (`Shown`) at other cycles, and the doubts about it that need no other run."""
     sent = replace(loaded.reader(database).read(row.run_id), cycles=cycles)
     if loaded.again is None:
         analysis = analyse(sent, loaded.state.geometry, loaded.state.record.torque_filter)
@@ -295,7 +295,7 @@ def _together(others: ClutchHistory, incoming: Event | None, changed: Sequence[E
 
 
 def _judged_with(loaded: _Loaded, accepted: Sequence[Event]) -> Judged:
-    """What becomes of the other runs; the runs themselves are as they were asked for, these of them `accepted`."""
+    """The judgement on all other runs, given the changed runs as requested, with these of them `accepted`."""
     other_runs = loaded.others
     for event in accepted:
         cofs = cofs_among(other_runs, event, loaded.levels.get(event.run_id, ()))
@@ -304,7 +304,7 @@ def _judged_with(loaded: _Loaded, accepted: Sequence[Event]) -> Judged:
 
 
 def _computed(database: Database, loaded: _Loaded, rows: Sequence[RunRow]) -> tuple[tuple[RunRow, ...], Results]:
-    """The runs as they are to be with their receipts, and all that follows."""
+    """The runs in their new states with receipts, and all results that follow."""
     before, other_runs = loaded.state, loaded.others
     pairs = [(row, event.at(row.cycles)) for row, event in zip(rows, loaded.events, strict=True)]
     accepted = [event for row, event in pairs if row.state == runs.ACCEPTED]
@@ -350,7 +350,7 @@ def _computed(database: Database, loaded: _Loaded, rows: Sequence[RunRow]) -> tu
 def _store(
     connection: Connection, loaded: _Loaded, changed: Sequence[RunRow], computed: Results, request: _Request
 ) -> None:
-    """The runs as they are to be and what follows, and the entries of the audit trail; the revision moves on."""
+    """Store the changed runs, the results that follow and the entries in the audit trail; move the revision on."""
     clutch_id = request.clutch_id
     for row in changed:
         runs.set_state(

@@ -24,7 +24,7 @@ from storage.engine.database import Database
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Edited:
-    """A clutch as it was and as it is to be, and what then follows: nothing, results of its history, or all of them."""
+    """A clutch's record before and after an edit, with the results to store: none, those of its history, or all."""
 
     before: ClutchRow
     record: ClutchIn
@@ -42,9 +42,10 @@ def edit(
     by: str,
     at: str,
 ) -> None:
-    """Replace these fields of a clutch's record, each as a whole, and archive the clutch or bring it back (None: neither).
+    """Replace these fields of a clutch's record, each as a whole, and archive the clutch or bring it back (None:
+    neither).
 
-    What is so already is not changed. Raises NotFoundError.
+    Fields with equal values are left alone. Raises NotFoundError.
     """
     for _ in repository.attempts(clutch_id):
         edited = _computed(database, clutch_id, fields, archived)
@@ -70,7 +71,7 @@ def _computed(database: Database, clutch_id: str, fields: Mapping[str, Any], arc
 
 
 def _results(database: Database, before: ClutchIn, record: ClutchIn) -> Results:
-    """The results that the changed record gives."""
+    """The results under the edited record."""
     with database.reading() as connection:
         state = repository.state(connection, record.clutch_id, edited=record)
         levels, receipts = (
@@ -83,7 +84,7 @@ def _results(database: Database, before: ClutchIn, record: ClutchIn) -> Results:
 
 
 def _entries(edited: _Edited) -> list[tuple[str, dict[str, object], dict[str, object]]]:
-    """What the audit trail says: the action, and what changes as it was and as it is."""
+    """The entries for the audit trail: each action with the changed fields before and after."""
     before, after = (record.model_dump(mode="json") for record in (repository.record(edited.before), edited.record))
     names = [name for name in before if before[name] != after[name]]
     entries: list[tuple[str, dict[str, object], dict[str, object]]] = []
@@ -96,7 +97,7 @@ def _entries(edited: _Edited) -> list[tuple[str, dict[str, object], dict[str, ob
 
 
 def _store(connection: Connection, edited: _Edited, *, reason: str, by: str, at: str) -> None:
-    """The record and what follows, and the entries of the audit trail; the revision moves on."""
+    """Store the edited record, the results that follow and the entries in the audit trail; move the revision on."""
     row, clutch_id, record = edited.before, edited.before.clutch_id, edited.record.model_dump(mode="json")
     clutches.set_record(
         connection,
@@ -115,9 +116,9 @@ def _store(connection: Connection, edited: _Edited, *, reason: str, by: str, at:
 
 
 def register(database: Database, clutch: ClutchIn, *, created_at: str) -> bool:
-    """Register a clutch; returns whether it is new. Raises ConflictError where it is known with other content.
+    """Register a clutch; true if it is new. Raises ConflictError if the clutch is registered with other content.
 
-    What is known is the record in force, and, where it was edited, that which was first registered.
+    Content is other if it equals neither the record in force nor, after an edit, the record first registered.
     """
     record = clutch.model_dump(mode="json")
     content = content_of(record)

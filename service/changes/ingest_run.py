@@ -53,8 +53,8 @@ MAX_FILE_BYTES = 900_000_000
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Outcome:
-    """What a run changes in a clutch at a revision: its receipt and mean COFs, doubts about it, and the results of what was
-    there before; `appended`: nothing of the history that was there has changed."""
+    """The results of a run for a clutch at a revision: its receipt, mean COFs and doubts, and the changed results of
+    earlier runs; `appended`: no earlier run's results changed."""
 
     revision: int
     receipt: Evaluation
@@ -76,8 +76,8 @@ def ingest_posted(
     by: str,
     path: Path | None = None,
 ) -> tuple[Receipt, bool]:
-    """Ingest a run that `read` makes from what was posted; a file at `path` is kept. Also raises what `read` does, and
-    TooLargeError where the file is too long to be kept."""
+    """Store the run that `read` returns from a request's body; a file at `path` is stored with it. Raises also the
+    errors of `read`, and TooLargeError if the file is too long to be kept."""
     if path is None:
         return ingest(database, clutch_id, read(), received_at=received_at, by=by)
     with ThreadPoolExecutor(1) as deflating:  # deflating lets the reader run
@@ -100,7 +100,7 @@ def ingest(
     by: str = "local",
     file: PackedFile | None = None,
 ) -> tuple[Receipt, bool]:
-    """Take in a run that `by` sent, read from `file`; returns its receipt and whether it is new. Where results of earlier
+    """Store a run sent by `by`, read from `file`; returns its receipt and whether it is new. Where results of earlier
     runs are damaged they are computed again first.
 
     The same run again gives the receipt as it is then, marked a duplicate. Raises NotFoundError for an unknown clutch,
@@ -155,7 +155,7 @@ def _ingested(
 
 
 def _stored(connection: Connection, clutch_id: str, run: IncomingRun) -> RunRow | None:
-    """The run of that name; of a file, also the one that has the same content since it was read again."""
+    """The stored run with this name; for a file, also a run with the same content after it was read again."""
     stored = runs.get(connection, clutch_id, run.run_id)
     if stored is None and run.file is not None:
         return runs.read_again_as(connection, clutch_id, run.content_sha256)
@@ -174,7 +174,7 @@ def _repeat(stored: RunRow, run: IncomingRun) -> Receipt:
 def _computed(
     database: Database, before: ClutchHistory, arrival: Arrival, read_with: tuple[Geometry, float]
 ) -> _Outcome:
-    """The results of the run in the clutch's history `before` it; it was read with a geometry and a filter.
+    """The results of a run added to the clutch's history `before` it; the run was read with a geometry and a filter.
 
     Accepted, it is one more event. Doubted, it is held, and only the summary speaks of it. Where it speaks for or
     against other runs, these are accepted or held as well, and the whole history is computed again.
@@ -243,8 +243,8 @@ def _computed(
 def _receipt(
     before: ClutchHistory, state: ClutchHistory, event: timeline.Event, arrival: Arrival, levels: Levels
 ) -> tuple[Evaluation, dict[str, str | None]]:
-    """The run's receipt, and by which stationary test the loops of each dynamic one were evaluated: of those before, and of
-    the run itself."""
+    """The run's receipt, and for each dynamic test (earlier ones and this run) the stationary test used to evaluate its
+    loops."""
     evaluated = dict(before.stationary_tests)
     loops: Sequence[FrictionLoop] = ()
     if event.kind == timeline.DYNAMIC:
@@ -271,7 +271,7 @@ def _one_step(
     arrival: Arrival,
     evaluated: Mapping[str, str | None],
 ) -> tuple[ClutchHistory, Results]:
-    """What changes with a run that leaves what was measured before as it is: the filters carried on, if they may be."""
+    """The results of an added run that changes no earlier mean COF: the filters are carried on by one step if possible."""
     corrected: dict[str, timeline.Corrected] = {}
     if state.extension is not None and event is state.events[-1]:
         runs_before = repository.run_reader(database, state.clutch_id)
@@ -314,7 +314,7 @@ def _own_levels(arrival: Arrival) -> dict[str, Sequence[LevelFit]]:
 
 
 def _levels(database: Database, state: ClutchHistory, event: timeline.Event, arrival: Arrival) -> Levels:
-    """The levels of all tests where they are needed, else those of the run alone."""
+    """The fitted levels of all tests if they are needed, else of this run alone."""
     if event.kind != timeline.DYNAMIC and event is state.events[-1] and not event.rebuild and state.adoption is None:
         return _own_levels(arrival)
     with database.reading() as connection:
@@ -330,7 +330,7 @@ def _store(
     *,
     by: str,
 ) -> Receipt:
-    """The run, its channels and fits, and what it changes; the revision moves on. Returns the receipt."""
+    """Store the run, its channels and fits, and the changes of other runs; move the revision on. Returns the receipt."""
     run = arrival.run
     row = RunRow(
         clutch_id=clutch_id,
@@ -380,7 +380,7 @@ def _event_of(arrival: Arrival) -> timeline.Event:
 
 
 def _changes_the_past(before: ClutchHistory, ordered: Sequence[timeline.Event], event: timeline.Event) -> bool:
-    """Whether predictions of earlier or later tests no longer hold.
+    """Whether the run invalidates predictions of other tests.
 
     A late test or rebuild may make another test the reference, and with it the protocol of all means; under an adopted
     model any late run may bear on the corrections of those after it, and a rebuild ends the model.

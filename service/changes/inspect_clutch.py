@@ -22,9 +22,9 @@ _ID_CHARACTERS = 16
 
 
 def inspect(database: Database, clutch_id: str, sent: InspectionIn, *, by: str, at: str) -> tuple[InspectionOut, bool]:
-    """Store an inspection; returns it as it is answered, and whether it is new: the same content is one inspection.
+    """Store an inspection; returns it as sent to clients, and whether it is new (equal content is one inspection).
 
-    Raises NotFoundError. An archived clutch takes inspections too: it may be taken apart when all tests are made.
+    Raises NotFoundError. An archived clutch accepts inspections, because it may be dismantled after its last test.
     """
     content = sent.model_dump(mode="json")
     content_sha256 = inspection_hash(content)
@@ -48,10 +48,10 @@ def inspect(database: Database, clutch_id: str, sent: InspectionIn, *, by: str, 
 def add_photograph(
     database: Database, clutch_id: str, inspection_id: str, content: bytes, media_type: MediaType, *, by: str, at: str
 ) -> tuple[PhotographOut, bool]:
-    """Add a photograph to an inspection; returns it as it is answered, and whether the inspection had it not yet.
+    """Add a photograph to an inspection; returns the inspection as sent to clients, and whether the photograph is new.
 
-    Raises NotFoundError, InvalidError where the content is not of that type, NotPossibleNowError where the inspection has
-    as many photographs as it may have.
+    Raises NotFoundError, InvalidError if the content is not of that type, NotPossibleNowError if the inspection has its
+    maximum of photographs.
     """
     _require_type(content, media_type)
     row = PhotographRow(
@@ -76,7 +76,7 @@ def add_photograph(
 
 
 def _require_type(content: bytes, media_type: MediaType) -> None:
-    """Raise InvalidError where a file does not begin as files of its type do."""
+    """Raise InvalidError if a file's first bytes are not those of its stated type."""
     begins = {
         "image/png": content.startswith(b"\x89PNG\r\n\x1a\n"),
         "image/jpeg": content.startswith(b"\xff\xd8\xff"),
@@ -91,9 +91,9 @@ def _require_type(content: bytes, media_type: MediaType) -> None:
 def change(
     database: Database, clutch_id: str, inspection_id: str, state: str, *, reason: str, by: str, at: str
 ) -> InspectionOut:
-    """Withdraw an inspection (`state` WITHDRAWN) or take that back (ACCEPTED); returns it as it is answered.
+    """Withdraw an inspection (`state` WITHDRAWN) or restore it (ACCEPTED); returns it as sent to clients.
 
-    One that is so already is not changed; else the audit trail and the clutch's revision move on. Raises NotFoundError.
+    If its state changes, the change enters the audit trail and the clutch's revision moves on. Raises NotFoundError.
     """
     with database.writing(of=clutch_id) as connection:
         row = inspection(connection, clutch_id, inspection_id)

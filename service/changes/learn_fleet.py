@@ -41,7 +41,8 @@ GAVE_WAY = "not refreshed now, because another fleet is being refreshed: a separ
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Lesson:
-    """What a life has taught: of eq. 6's coefficients, and, where it has ended, of its end; ζ in standard cycles."""
+    """The information of one life for the fleet prior: the coefficients of eq. 6 and, if the life has ended, its end; ζ
+    in standard cycles."""
 
     taught: Taught
     ended: ObservedLife | None
@@ -49,15 +50,15 @@ class Lesson:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Fleet:
-    """Clutches of a kind, the version of its prior that was stored before they were read (0: none), and what the lives of
-    each have taught."""
+    """The clutches of a kind with their lives' lessons, and the version of the kind's prior stored before they were
+    read (0: none)."""
 
     kind: Kind
     version: int
     lessons: dict[str, list[Lesson]] = field(default_factory=dict)
 
     def without(self, left_out: Collection[str]) -> Json | None:
-        """What all other clutches have taught, as it is stored; None where too few are left."""
+        """The prior learned from all clutches but those `left_out`, as JSON; None if too few remain."""
         left = [lessons for name, lessons in sorted(self.lessons.items()) if name not in left_out]
         if len(left) < FEWEST_CLUTCHES:
             return None
@@ -71,8 +72,8 @@ class Fleet:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Refreshed:
-    """What a refresh did: the kinds of which a new version was stored, the clutches whose answers have changed, and those
-    left to the next refresh, with the reason."""
+    """The outcome of a refresh: kinds with a new version, clutches with changed answers, and clutches left to the next
+    refresh, with the reason."""
 
     kinds: tuple[Kind, ...]
     changed: tuple[str, ...]
@@ -93,11 +94,11 @@ def refresh(
     advance: Callable[[], object] = lambda: None,
     gives_way: Callable[[], bool] = lambda: False,
 ) -> Refreshed:
-    """Learn the prior of a fleet, by its key, None: of all, again; one that differs is a new version, and tracks are made
-    again.
+    """Learn the prior of a fleet again, by its key (None: of all fleets); store a changed one as a new version, and
+    track its clutches again.
 
-    Where it is `learned` already, tracks alone are made again; of no more clutches once it `gives_way`, but of one at least.
-    `advance` is called twice for every clutch: as it has taught, and as its tracks are up to date.
+    If it is `learned` already, only track clutches; stop once `gives_way` is true, but after at least one clutch.
+    `advance` is called twice per clutch: after its lessons are learned, and once its tracks are up to date.
     """
     fresh = set() if learned else _learned(database, of, now, executor, advance)
     names = _names(database, of)
@@ -120,7 +121,8 @@ def refresh(
 
 
 def _names(database: Database, of: str | None) -> list[str]:
-    """The clutches that may be of a fleet, those first whose life goes on: somebody waits for their predictions."""
+    """The clutches that may belong to a fleet; those with a life that goes on come first, because their predictions are
+    needed soonest."""
     kind = None if of is None else _kind(of)
     with database.reading() as connection:
         rows = [repository.clutch(connection, clutch_id) for clutch_id in clutches.all_ids(connection)]
@@ -131,7 +133,7 @@ def _names(database: Database, of: str | None) -> list[str]:
 def _learned(
     database: Database, of: str | None, now: str, executor: Executor, advance: Callable[[], object]
 ) -> set[str]:
-    """The fleets, by key, of which a new version was learned and stored."""
+    """The keys of the fleets with a newly learned and stored version."""
     fresh: set[str] = set()
     while True:
         endings = {
@@ -146,13 +148,13 @@ def _learned(
 
 
 def _silent() -> None:
-    """Progress that was said already."""
+    """A progress function that does nothing, for progress already counted."""
 
 
 def _fleets(
     database: Database, executor: Executor, names: Sequence[str], advance: Callable[[], object]
 ) -> dict[str, Fleet]:
-    """The fleets with what their clutches teach, by kind; `advance` is called for each clutch."""
+    """The fleets with their clutches' lessons, by key; `advance` is called for each clutch."""
     with database.reading() as connection:
         allow_damage(connection, everywhere=True)  # versions alone
         versions = {
@@ -173,10 +175,10 @@ def _fleets(
 def as_job(
     database: Database, task: ChangeTask, *, say: Callable[[Json], None], executor: Executor
 ) -> tuple[dict[str, int], dict[str, str]]:
-    """Refresh a fleet's prior, or all of them, saying how far it has come.
+    """The job that refreshes one fleet's prior or all, and reports progress.
 
-    Once a clutch is tracked, another fleet that is to learn goes first; the rest of the clutches becomes a job of its own.
-    How many kinds have a new version and of how many clutches the answers have changed, and why others are left.
+    Once it has tracked a clutch, it gives way to another waiting fleet job: the remaining clutches become a new job.
+    Returns the numbers of kinds with a new version and of clutches with changed answers, and why others were left.
     """
     number, learned = len(_names(database, task.of)), task.arguments.get("learned", False)
     advanced = number if learned else 0
@@ -216,19 +218,19 @@ def _state(database: Database, clutch_id: str) -> ClutchHistory:
 
 
 def _kind(name: str) -> Kind:
-    """The kind of clutches that a fleet is named by."""
+    """The kind of clutches with this fleet key."""
     return Kind.model_validate(to_object(name))
 
 
 def lessons_of(state: ClutchHistory) -> tuple[Kind, list[Lesson]]:
-    """A clutch's kind, and what each of its lives teaches."""
+    """A clutch's kind, and the lesson of each of its lives."""
     assumptions = state.assumptions
     lessons = [_lesson(life, assumptions, state.fraction) for life in state.lives]
     return state.kind, [lesson for lesson in lessons if lesson is not None]
 
 
 def _lesson(life: Life, assumptions: Assumptions, fraction: float) -> Lesson | None:
-    """What a life teaches; None where it was tested too little."""
+    """The lesson of a life; None if it has too few tests."""
     series = life.pooled(assumptions)
     measurements, unit = series.measurements, series.scale.severity.unit
     if len(measurements) < FEWEST_TESTS_TO_LEARN:
@@ -258,9 +260,10 @@ def _lesson(life: Life, assumptions: Assumptions, fraction: float) -> Lesson | N
 
 
 def _stored_again(database: Database, fleet: Fleet, now: str, executor: Executor) -> Ending:
-    """Store a fleet's prior, and what it is without each of its clutches, as the version after the one before its lessons.
+    """Store a fleet's prior, and the priors learned without each of its clutches, as the version after the one its
+    lessons were read at.
 
-    NOTHING where it is what is stored already; LEFT where another refresh has stored a version since.
+    Returns NOTHING if the stored prior is equal, LEFT if another refresh has stored a version meanwhile.
     """
     (learned,) = executor.map(learned_without, [(fleet, ())])
     with database.reading() as connection:
@@ -282,13 +285,13 @@ def _stored_again(database: Database, fleet: Fleet, now: str, executor: Executor
 
 
 def learned_without(of: tuple[Fleet, Collection[str]]) -> Json | None:
-    """What a fleet has taught without some of its clutches."""
+    """The prior of a fleet without some of its clutches; a module-level function, so that it can be pickled."""
     fleet, left_out = of
     return fleet.without(left_out)
 
 
 def _versions(fleet: Fleet, whole: Json | None, version: int, now: str, executor: Executor) -> Sequence[FleetPriorRow]:
-    """The prior of all clutches, and of all but each one or group of them, as they are stored."""
+    """The rows of the prior of all clutches, and of the priors without each clutch or group of clutches."""
     members = tuple(sorted(fleet.lessons))
     groups = assumptions.groups(members)
     learned = executor.map(learned_without, ((fleet, group) for group in groups))
@@ -309,7 +312,7 @@ def _versions(fleet: Fleet, whole: Json | None, version: int, now: str, executor
 
 
 def _brought_up(database: Database, names: Sequence[str], executor: Executor) -> Iterator[Ended[Results]]:
-    """Track clutches again where their stored predictions were made under another prior."""
+    """Track the clutches again whose stored predictions are based on another prior."""
 
     def load(clutch_id: str) -> _Tracked | None:
         with database.reading() as connection:

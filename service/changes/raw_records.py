@@ -18,7 +18,8 @@ _BATCH = 500
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Collected:
-    """What was found in a store: blobs that runs name, those that none does but that are too new, and those removed."""
+    """The result of cleaning up a store: the numbers of blobs named by runs, of unnamed blobs too new to remove, and of
+    removed blobs."""
 
     address: str
     named: int
@@ -27,10 +28,10 @@ class Collected:
 
 
 def use(database: Database, address: str | None) -> None:
-    """Have long columns of new runs go to that address from now on; those that are stored stay where they are.
+    """Store long columns of new runs at that address from now on; columns already stored stay in place.
 
-    None changes nothing. The store is marked as this database's, for what nothing here names is removed from it.
-    Raises ValueError on an address of no kind or another database's store, RawStoreUnavailable where it cannot be reached.
+    None changes nothing. The store is marked as this database's, because blobs not named here are removed from it.
+    Raises ValueError on an address of no kind or another database's store, RawStoreUnavailable if it cannot be reached.
     """
     if address is None:
         return
@@ -46,7 +47,7 @@ def use(database: Database, address: str | None) -> None:
 
 
 def relocate(database: Database, address: str, to: str) -> int:
-    """Say in the database that a store's blobs, which were copied, are now at another address; returns how many.
+    """Record that a store's blobs, already copied, are now at another address; returns their number.
 
     Nothing changes, and ValueError is raised, where the store is unknown, a blob is missing at the new address, the copy is
     another database's, or a run came meanwhile.
@@ -77,10 +78,10 @@ def relocate(database: Database, address: str, to: str) -> int:
 
 
 def move(database: Database, to: str, *, tell: Callable[[int], None]) -> int:
-    """Use the store at that address, and take all long columns there; how many were taken. `tell` is told of each.
+    """Use the store at that address and move all long columns there; returns their number. `tell` is called for each.
 
-    Where it ends before its time it goes on at its next call; whatever it has done so far, all columns are found. What is
-    left in the former stores is `collect`'s. Raises as `use` does, and DamagedData where a column is damaged.
+    An interrupted move continues at the next call; all columns can be read at any time. The copies left in former
+    stores are removed by `collect`. Raises the errors of `use`, and DamagedData if a column is damaged.
     """
     use(database, to)
     address = normal_address(to)
@@ -106,8 +107,8 @@ def move(database: Database, to: str, *, tell: Callable[[int], None]) -> int:
 
 
 def collect(database: Database, *, grace: float, now: float | None = None) -> list[Collected]:
-    """Remove from every store what no run names and what was put there more than `grace` [s] ago: a run on its way has
-    put its blobs not long before. Raises RawStoreUnavailable, ValueError where a store has another database's mark."""
+    """Remove blobs that no run names from every store, if they are older than `grace` [s]: a run being stored has put
+    its blobs shortly before its row. Raises RawStoreUnavailable, ValueError if a store has another database's mark."""
     now = time.time() if now is None else now
     with database.reading() as connection:
         stores = raw_stores.all_of(connection)
@@ -136,7 +137,8 @@ def _collected(database: Database, store: RawStore, *, before: float, now: float
 
 
 def _remove(database: Database, opened: BlobStore, store: RawStore, names: Sequence[str], *, at: float) -> int:
-    """Remove those that no row names; it is noted before and after."""
+    """Remove the blobs that no row names; returns their number. The removal is recorded in the database before and
+    after."""
     count = 0
     for start in range(0, len(names), _BATCH):
         batch = names[start : start + _BATCH]
@@ -152,7 +154,8 @@ def _remove(database: Database, opened: BlobStore, store: RawStore, names: Seque
 
 
 def _claim(database: Database, address: str) -> None:
-    """Mark a store as this database's; the mark is noted here first, so that a start that is cut off can be repeated."""
+    """Mark a store as this database's; the mark is first recorded in the database, so that an interrupted start can be
+    repeated."""
     store = open_store(address)
     with database.reading() as connection:
         marks = {row.address: row.mark for row in raw_stores.all_of(connection)}

@@ -25,10 +25,10 @@ def clutch_ids(database: Database) -> list[str]:
 
 
 def replay(database: Database, clutch_ids: Sequence[str], executor: Executor) -> Iterator[Ended[Results]]:
-    """Fit and track all runs of these clutches again; each as it ends.
+    """Fit and track all runs of these clutches again; yields each clutch as it ends.
 
-    A clutch of which runs came at each of MAX_ATTEMPTS has a BusyError; errors that are nobody's data are raised. The
-    revision moves on only where a result has changed.
+    A clutch that changed during each of MAX_ATTEMPTS attempts ends with BusyError; errors not caused by a clutch's data
+    are raised. The revision moves on only if a result changed.
     """
 
     def load(clutch_id: str) -> Recorded:
@@ -62,9 +62,9 @@ def replay(database: Database, clutch_ids: Sequence[str], executor: Executor) ->
 def as_job(
     database: Database, task: ChangeTask, *, say: Callable[[Json], None], executor: Executor
 ) -> tuple[dict[str, int], dict[str, str]]:
-    """Replay a clutch, None: all of them, saying how far it has come.
+    """The job that replays a clutch (None: all clutches) and reports progress.
 
-    How many clutches were replayed, and why the others keep the results that they had.
+    Returns the number of replayed clutches, and why others kept their results.
     """
     names = clutch_ids(database) if task.of is None else [task.of]
     left: dict[str, str] = {}

@@ -25,11 +25,11 @@ def ask(
     created_at: str,
     isolability: bool = False,
 ) -> tuple[str, bool]:
-    """Ask for a diagnosis of all runs that are there now; returns its id, and whether it is new.
+    """Queue a diagnosis of all present runs; returns its id and whether it is new (an open one of the same runs is
+    reused).
 
-    Where the very same runs are being diagnosed already it is that one. `adopt`: what it finds is adopted in the name of
-    `by`; `isolability`: it says which causes its tests could tell apart; `request`: the id of the request that asks.
-    Raises NotFoundError, BusyError where `most` wait or run already.
+    `adopt`: its finding is adopted in the name of `by`; `isolability`: it also reports which causes its tests could
+    tell apart; `request`: the id of the asking request. Raises NotFoundError, BusyError if `most` wait or run already.
     """
     with database.writing(of=clutch_id) as connection:
         clutch = repository.clutch(connection, clutch_id)
@@ -85,10 +85,10 @@ def finish(
     at: str,
     adopt: Callable[[JobRow, Mapping[str, Any]], bool],
 ) -> None:
-    """Store how a claimed job's diagnosis ended: its `report` and `extension`, or its `problem`.
+    """Store the end of a claimed job's diagnosis: its `report` and `extension`, or its `problem`.
 
-    Where somebody wants what it found adopted, `adopt` does both at once; it returns False where there is nothing to adopt.
-    A job that is no longer the claimer's was cancelled, or is made by another: then nothing is stored.
+    If the asker wanted the finding adopted, `adopt` does both at once; it returns false if there is nothing to adopt.
+    Nothing is stored if the job is no longer the claimer's, because it was cancelled or claimed by another service.
     """
     for _ in repository.attempts(job.clutch_id or ""):
         with database.reading() as connection:

@@ -15,10 +15,9 @@ from storage.rigs import RigRow
 
 
 def save(database: Database, rig: RigIn, *, by: str, at: str, replacing: bool = False) -> tuple[RigOut, bool]:
-    """Save a profile; returns it as it is in force, and whether its name is new. Saving the same profile again changes
-    nothing.
+    """Save a profile; returns it as in force, and whether its name is new. Saving an equal profile changes nothing.
 
-    Raises ConflictError where the name has another profile and is not to be replaced.
+    Raises ConflictError if the name has another profile that may not be replaced.
     """
     content = rig.model_dump(mode="json")
     with database.writing() as connection:
@@ -36,5 +35,6 @@ def save(database: Database, rig: RigIn, *, by: str, at: str, replacing: bool = 
 
 
 def save_confirmed(database: Database, confirmed: Callable[[], RigIn], by: str, at: str) -> tuple[RigOut, bool]:
-    """Save the profile of a new rig, by which a run's file was read as its sender confirmed. Raises as `save` does."""
+    """Save the profile of a new rig as confirmed by the sender of a run's file, which was read by it. Raises the errors
+    of `save`."""
     return save(database, confirmed(), by=by, at=at)

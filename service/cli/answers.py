@@ -28,7 +28,7 @@ Csv = Annotated[bool, typer.Option("--csv", help="Print the answer as CSV")]
 
 
 def _arguments(given: list[str] | None, **named: Any) -> JsonObject:
-    """The route's arguments: those with an option of their own, where they are given, and those of `--query`."""
+    """The route's arguments: the options given, and those of `--query`."""
     arguments = {name: value for name, value in named.items() if value is not None}
     for assignment in given or []:
         name, equals, value = assignment.partition("=")
@@ -47,7 +47,7 @@ def _answer(
     as_json: bool,
     as_csv: bool = False,
 ) -> None:
-    """Print the answer at an address as a table, as JSON or as CSV."""
+    """Print the answer of an address as a table, as JSON or as CSV."""
     if as_json and as_csv:
         fail("use --json or --csv, not both", EX_USAGE)
     if as_csv:
@@ -120,7 +120,7 @@ def life(
 
 
 def _show_life(answer: Mapping[str, Any]) -> None:
-    """A prediction as a table: where the clutch stands, and the quantiles of what remains."""
+    """A prediction as a table: the clutch's present state, and quantiles of the remaining life."""
     at = "" if answer["as_of_cycles"] is None else f" at {answer['as_of_cycles']:,.0f} cycles"
     out.print(f"{answer['clutch_id']}{at}: {answer['statement']}", markup=False, style="bold")
     for text in _lines(answer):
@@ -172,7 +172,7 @@ _COURSES = {"eq6": "ages as expected", "slowing": "ages slower and slower", "acc
 
 
 def _criterion(end: Mapping[str, Any]) -> list[str]:
-    """A criterion: what it is now, its limit, when that is reached, and how probably it is the first."""
+    """The row of a criterion: present value, limit, when it is reached, and the probability that it is the first."""
     current = end["current"]
     return [
         *_quantity(end),
@@ -184,7 +184,7 @@ def _criterion(end: Mapping[str, Any]) -> list[str]:
 
 
 def _quantity(item: Mapping[str, Any]) -> Iterator[str]:
-    """A quantity, the pressure at which it holds or the mean over them, and its speed or frequency where it has one."""
+    """The name of a quantity with its pressure (or the mean over pressures), and its speed or frequency if any."""
     yield item["quantity"]
     yield "mean" if item["pressure_bar"] is None else f"{item['pressure_bar']:g}"
     for name in ("speed_rpm", "frequency_hz"):
@@ -192,7 +192,7 @@ def _quantity(item: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _quantiles(answer: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any], Any]]:
-    """(name, quantiles, how one is written) of each row."""
+    """Rows of quantiles: (name, quantiles, format)."""
     yield "remaining cycles", answer["remaining_cycles"], cycles
     yield "end of life, cycles", answer["end_of_life_cycles"], cycles
     held_runs = answer.get("held_runs")
@@ -207,7 +207,8 @@ def _quantiles(answer: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, An
 
 
 def _programme(plan: Path | None, blocks: list[str], pace: float | None) -> JsonObject:
-    """The request body; what is wrong with its content the service says. A pace that is given replaces the file's."""
+    """The request body for a planned programme; its content is checked by the service. A given pace replaces the
+    file's."""
     if plan is not None and blocks:
         fail("use --plan or --block, not both", EX_USAGE)
     body = {"programme": [_block(text) for text in blocks]} if plan is None else json.loads(plan.read_bytes())
@@ -266,7 +267,7 @@ def _tracked(item: Mapping[str, Any]) -> list[str]:
 
 
 def _last(item: Mapping[str, Any]) -> tuple[str, str]:
-    """The track at the last measurement: its median and its 90 % band."""
+    """The track at the last measurement: median and 90 % band."""
     measured, band = item["measured"]["cycles"], item["trajectory"]
     if not measured or band is None or not band["cycles"]:
         return "-", "-"
@@ -325,7 +326,7 @@ def engagement(
 
 
 def _show_engagement(answer: Mapping[str, Any]) -> None:
-    """The engagement's outcome, and its course at evenly spaced samples."""
+    """The engagement's result, and its course at evenly spaced samples."""
     end = f"engaged after {answer['duration_s']:.3g} s" if answer["engaged"] else "still slipping at the end"
     out.print(
         f"{answer['clutch_id']} at {answer['at_cycles']:,.0f} cycles, simulated: {end}, {number(answer['energy_kj'])} kJ",
@@ -348,7 +349,7 @@ def _show_engagement(answer: Mapping[str, Any]) -> None:
 
 
 def _measured(item: Mapping[str, Any]) -> list[str]:
-    """A measured engagement: its indicators with their standard errors."""
+    """The rows of a measured engagement: its indicators with their standard errors."""
     estimates = [item["indicators"][name] for name in _INDICATORS]
     shown = ["-" if part is None else with_deviation(part["value"], part["sd"]) for part in estimates]
     return [item["run_id"], number(item["cycles"]), *shown]

@@ -162,7 +162,8 @@ def archive(
 
 
 def _assign(fields: JsonObject, record: JsonObject, assignment: str) -> None:
-    """Put `geometry.friction_faces=4` into the field that is sent, whose other parts stay as they are in the record."""
+    """Set a part of a field, as `geometry.friction_faces=4`, in the field to be sent; its other parts keep their
+    recorded values."""
     name, equals, text = assignment.partition("=")
     field, dot, part = name.strip().partition(".")
     if not equals or not field:

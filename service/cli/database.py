@@ -42,7 +42,7 @@ def backup(path: Path, database: Database = DATABASE) -> None:
 
 
 def _left_out(path: Path) -> dict[str, int]:
-    """How many blobs the copy names in which store; an earlier revision names none."""
+    """The number of blobs that the copy names, by store; an earlier revision names none."""
     from storage.blobs import raw_stores  # start-up time
     from storage.engine.opening import find_database  # start-up time
 

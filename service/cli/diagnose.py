@@ -44,12 +44,12 @@ _MARKS = ((0.75, "##", 160, 27), (0.5, "++", 203, 69), (0.25, "+ ", 217, 153))
 
 
 def _spelt(slug: str) -> str:
-    """An effect or an axis in words, without the unit in its name."""
+    """The name of an effect or an axis in words, without its unit."""
     return re.sub(r"_(rpm|bar|s|c|nm)$", "", slug).replace("_", " ")
 
 
 def shown(report: Mapping[str, Any]) -> Iterator[RenderableType]:
-    """The parts of a finished report, each to be printed."""
+    """The parts of a finished report, to be printed one by one."""
     words, colour = _VERDICTS[report["verdict"]]
     causes = f": {', '.join(map(_spelt, report['causes']))}" if report["causes"] else ""
     yield Panel(Text(report["summary"]), title=Text(f"{words}{causes}", style=f"bold {colour}"), border_style=colour)
@@ -80,7 +80,7 @@ def shown(report: Mapping[str, Any]) -> Iterator[RenderableType]:
 
 
 def _friction_law(law: Mapping[str, Any]) -> str:
-    """How far the friction curve is from eq. 3, and what that gains."""
+    """The deviation of the friction curve from eq. 3, and the smaller error of the curve as found on held-out runs."""
     low, high = law["interval_percent"]
     text = (
         f"Friction curve against eq. 3: {number(law['rms_percent'], 2)} % ({number(low, 2)} to {number(high, 2)} %) RMS"
@@ -91,7 +91,7 @@ def _friction_law(law: Mapping[str, Any]) -> str:
 
 
 def _use(advice: Mapping[str, Any]) -> str:
-    """What a test is good for: it narrows the size of a cause that is named, or distinguishes two."""
+    """The purpose of an advised test: it narrows the size of a named cause, or distinguishes two causes."""
     cause, other = map(_spelt, advice["separates"])
     if advice["narrows"]:
         return f"narrows the size of {cause} to {100 * advice['narrows']:.0f} % of its present uncertainty"
@@ -104,7 +104,7 @@ def _in_unit(value: str, unit: str) -> str:
 
 
 def _table(*columns: str, right: Sequence[str] = ()) -> Table:
-    """A table without frames, the columns named in `right` justified there."""
+    """A table without frames; the columns named in `right` are right-aligned."""
     table = Table(box=None, pad_edge=False, header_style="bold")
     for name in columns:
         table.add_column(name, justify="right" if name in right else "left")
@@ -122,7 +122,7 @@ def _candidates(candidates: Sequence[Mapping[str, Any]]) -> Table:
 
 
 def _visible(visible: Sequence[Mapping[str, Any]]) -> Table:
-    """From which size on an effect would be seen: in any of its forms, and in the one that shows best."""
+    """The smallest detectable size of an effect: in any of its forms, and in its most visible form."""
     shapes = ("in every shape", "in the most visible shape")
     table = _table("smallest visible size of", *shapes, right=shapes)
     for item in visible:
@@ -135,7 +135,7 @@ def _visible(visible: Sequence[Mapping[str, Any]]) -> Table:
 
 
 def _isolability(isolability: Mapping[str, Any]) -> Iterator[RenderableType]:
-    """The pairs that these tests could not tell apart for sure, hardest first, and what they cannot show."""
+    """The pairs of causes that these tests might not distinguish, hardest first, and the causes that they cannot show."""
     hard = [pair for pair in isolability["pairs"] if not pair["apart"]]
     table = _table("causes", "distinguished", "better by this test", "then")
     for pair in hard:
@@ -158,7 +158,7 @@ def _evidence(gain: float | None) -> str:
 
 
 def _maps(maps: Mapping[str, Any]) -> Group:
-    """Both models' residuals by pressure over speed and over cycles, as shares of the baseline's largest."""
+    """Both models' residuals by pressure, over speed and over cycles, as shares of the baseline's largest residual."""
     drawn: list[Group] = []
     largest: list[float] = []
     levels, speeds, cycles_at = (maps["axes"][name] for name in ("pressure_bar", "speed_rpm", "cycles"))
@@ -181,13 +181,13 @@ def _maps(maps: Mapping[str, Any]) -> Group:
 
 
 def _thinned(table: Sequence[Sequence[float | None]]) -> _Cells:
-    """A map with a row a pressure, its columns averaged until they fit."""
+    """A map with one row per pressure, with columns averaged until they fit the terminal."""
     size = max(1, math.ceil(max(map(len, table), default=0) / _MAX_CELLS))
     return [[_mean(line[start : start + size]) for start in range(0, len(line), size)] for line in table]
 
 
 def _grid(title: str, rows: Sequence[float], columns: Sequence[float], table: _Cells, largest: float) -> Text:
-    """Residuals as coloured blocks that can be read without colours too, the highest row first."""
+    """Residuals as coloured blocks, readable without colours too, highest row first."""
     text = Text(f"{title}\n", style="bold")
     for level, line in sorted(zip(rows, table, strict=True), key=lambda pair: -pair[0]):
         text.append(f"{level:5.3g} ", style="not bold")

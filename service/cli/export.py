@@ -91,8 +91,9 @@ def _export(service: Service, clutch: str, out_folder: Path) -> None:
 
 
 def _tables(service: Service, clutch: str, folder: Path) -> None:
-    """Every table of the API as CSV, all of them as sheets of a workbook, and as Parquet where its library is installed.
-    What a clutch does not have yet, as surfaces before its first stationary test, is left out."""
+    """Write every table of the API as CSV, all of them as sheets of a workbook, and as Parquet if its library is
+    installed. Answers that the clutch does not have yet, such as surfaces before its first stationary test, are left
+    out."""
     tables = dict[str, str]()
     for name in TABLES:
         try:
@@ -115,7 +116,7 @@ def _parquet_can_be_written() -> bool:
 
 
 def _description(service: Service, clutch: JsonObject, record: JsonObject) -> JsonObject:
-    """What an export is of: the release, the settings of the clutch, and the data by their hashes."""
+    """The description of an export: the release, the settings of the clutch, and the hashes of its data."""
     runs = service.pages(f"/v1/clutches/{clutch['clutch_id']}/runs")
     return {
         "clutch_id": clutch["clutch_id"],
@@ -152,7 +153,7 @@ def _results(service: Service, clutch: str, folder: Path) -> None:
 
 
 def _inspections(service: Service, clutch: str, folder: Path) -> None:
-    """The inspections, and each photograph once as `photographs/ITS-HASH.png` or what it is."""
+    """Write the inspections, and each photograph once, as `photographs/HASH.png` or with the suffix of its type."""
     base = f"/v1/clutches/{clutch}/inspections"
     inspections = list(service.pages(base))
     _write(folder / "inspections.json", inspections)

@@ -103,7 +103,7 @@ _NOTHING = (
 
 
 def _refresh_on_service(service: Service, *, quiet: bool) -> None:
-    """Ask for a refresh, await its end, and say what has changed."""
+    """Start a refresh on the service, wait until it has ended, and print its changes."""
     job = service.post("/v1/jobs", {"kind": "fleet_refresh"}, prefer=f"wait={_WAIT}")
     while job["state"] in ("waiting", "running"):
         time.sleep(_LOOK)

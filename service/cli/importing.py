@@ -75,7 +75,7 @@ def import_file(
 
 
 def _question(shown: JsonObject, clutch: str) -> str:
-    """What is asked before a file is sent."""
+    """The question for the user before a file is sent."""
     if shown["suggestion"] is None:
         return f"Send it to {clutch}?"
     sure = f"{shown['suggestion']['confidence']:.0%}"
@@ -83,7 +83,7 @@ def _question(shown: JsonObject, clutch: str) -> str:
 
 
 def _sent(service: Service, path: str, file: Path, given: JsonObject, profile: JsonObject | None) -> JsonObject:
-    """The answer to the file, read by a profile that is not saved, or by a saved one or none."""
+    """The service's answer to the file, read by an unsaved profile, a saved one, or none."""
     parameters = {name: str(value) for name, value in given.items() if value is not None} | {"filename": file.name}
     if profile is None:
         return service.post_file(path, file, parameters)
@@ -93,7 +93,7 @@ def _sent(service: Service, path: str, file: Path, given: JsonObject, profile: J
 
 
 def _show(shown: JsonObject) -> None:
-    """The preview: a row a column of the file, then what is cut and fitted."""
+    """Print the preview: one row per column of the file, then the plateaus and fits."""
     title = None if shown["rig"] is None else f"read by the rig profile {shown['rig']}"
     grid = Table(title=title, title_justify="left")
     for name in ("#", "column", "channel", "unit", "scale", "offset", *(f"row {row + 1}" for row in range(_ROWS))):
@@ -119,7 +119,7 @@ def _show(shown: JsonObject) -> None:
 
 
 def _answered(shown: JsonObject, given: JsonObject, profile: JsonObject | None) -> JsonObject | None:
-    """Ask for each thing that is missing; the profile with the answers, `given` changed in place."""
+    """Ask for each missing fact; returns the profile with the answers, and changes `given` in place."""
     columns = [dict(column) for column in shown["profile"]["columns"]]
     edited = False
     for name in shown["missing"]:
@@ -140,7 +140,7 @@ def _answered(shown: JsonObject, given: JsonObject, profile: JsonObject | None) 
 
 
 def _choice(question: str, values: list[str]) -> str:
-    """One of the values, by its number."""
+    """Ask for one of the values by its number."""
     for place, value in enumerate(values, 1):
         print_line(f"  {place}  {value}")
     while True:
@@ -150,7 +150,7 @@ def _choice(question: str, values: list[str]) -> str:
 
 
 def _save(service: Service, name: str, shown: JsonObject) -> None:
-    """Keep how the file was read under a name."""
+    """Save the reading of the file as a rig profile of this name."""
     body = shown["profile"] | {"name": name, "kind": shown["profile"]["kind"] or shown["kind"]}
     service.post("/v1/rigs", body)
     pattern = body["file_name"]

@@ -40,7 +40,8 @@ _UsageError: Any = typer.BadParameter.__mro__[1]
 
 
 class Commands(TyperGroup):
-    """The commands; a wrong call ends in one line, `status` then with its code for what is unknown."""
+    """The group of all commands; a usage error prints one line, and after `status` ends with its code for an unknown
+    state."""
 
     def invoke(self, ctx: Any) -> Any:
         try:

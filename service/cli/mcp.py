@@ -29,7 +29,8 @@ _LISTED: dict[str, JsonObject] = {"limit": _COUNT, "cursor": _TEXT}
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tool:
-    """A GET of the API: `{names}` in its path are required arguments, `optional` ones go into the query."""
+    """A GET of the API offered as a tool: `{names}` in its path are required arguments, `optional` ones go into the
+    query."""
 
     name: str
     about: str
@@ -42,7 +43,7 @@ class Tool:
         return [part.partition("}")[0] for part in self.path.split("{")[1:]]
 
     def described(self) -> JsonObject:
-        """The tool as `tools/list` names it."""
+        """The tool's description in `tools/list`."""
         return {
             "name": self.name,
             "description": self.about,
@@ -56,7 +57,7 @@ class Tool:
         }
 
     def asked(self, service: Service, arguments: Mapping[str, Any]) -> JsonObject:
-        """The service's answer. Raises ValueError on wrong arguments, ClutchlifeError as the client does."""
+        """The service's answer to a call. Raises ValueError on wrong arguments, and the client's ClutchlifeError."""
         unknown = arguments.keys() - {*self.required, *self.optional}
         missing = [name for name in self.required if not arguments.get(name)]
         if unknown or missing:
@@ -147,7 +148,7 @@ def mcp(service: Service) -> None:
 
 
 def answered(service: Service, line: str) -> JsonObject | None:
-    """The answer to a message; None where it is a notification."""
+    """The answer to a message; None if the message is a notification."""
     try:
         message = json.loads(line)
     except (ValueError, RecursionError):
@@ -183,7 +184,7 @@ def answered(service: Service, line: str) -> JsonObject | None:
 
 
 def _called(service: Service, tool: Tool, arguments: Mapping[str, Any]) -> JsonObject:
-    """The result of a call; what the service refuses, or that it is away, is said to the caller."""
+    """The result of a tool call; a refusal by the service or its absence is a result too."""
     try:
         answer = tool.asked(service, arguments)
     except (ClutchlifeError, ValueError) as error:

@@ -32,10 +32,10 @@ _COMMANDING = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069
 
 
 class _Terminal(Console):
-    """A console on which a text moves no cursor, whoever wrote the note, title or name in it."""
+    """A console that prints control characters in notes, titles and names as �, so that no text moves the cursor."""
 
     def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
-        """What is printed, piece by piece; rich's own commands are pieces of their own."""
+        """The printed segments; rich's own control codes are segments of their own and stay."""
         for part in super().render(renderable, options):
             yield part if part.control else Segment(_COMMANDING.sub("\N{REPLACEMENT CHARACTER}", part.text), part.style)
 
@@ -90,7 +90,7 @@ DATABASE, URL = DEFAULT_DATABASE, DEFAULT_URL
 
 @contextmanager
 def errors_in_a_line() -> Iterator[None]:
-    """Errors of files, databases, addresses and the service are printed in one line, not as a traceback."""
+    """Context that prints errors of files, databases, addresses and the service in one line instead of a traceback."""
     try:
         yield
     except ServiceAwayError as error:
@@ -107,8 +107,8 @@ def errors_in_a_line() -> Iterator[None]:
 
 @contextmanager
 def existing(url: str, *, read_only: bool = False) -> Iterator["Opened"]:
-    """An open database that exists already: a mistyped address makes no new one. An older one is migrated, or with
-    `read_only` left at its revision."""
+    """The open, existing database; a mistyped address creates none. An older database is migrated, or left at its
+    revision if `read_only`."""
     from storage.engine.opening import find_database, open_database  # start-up time: most commands open no database
 
     with errors_in_a_line():
@@ -119,7 +119,7 @@ def existing(url: str, *, read_only: bool = False) -> Iterator["Opened"]:
 
 @contextmanager
 def executor(scheduler: str) -> Iterator["Executor"]:
-    """The executor of an option, closed at the end; that it cannot be used ends the command with a line."""
+    """Context with the executor of an option; if it cannot be used, the command ends with a line."""
     from service.jobs import executor as executors  # start-up time: few commands compute
 
     with errors_in_a_line():
@@ -131,7 +131,7 @@ def executor(scheduler: str) -> Iterator["Executor"]:
 
 
 def require_database(url: str) -> None:
-    """End the command where there is no database at the address."""
+    """End the command if there is no database at the address."""
     from service.settings import redacted  # start-up time: most commands open no database
     from storage.engine.opening import database_exists  # start-up time: most commands open no database
 
@@ -140,7 +140,7 @@ def require_database(url: str) -> None:
 
 
 def require_file(url: str, instead: str) -> None:
-    """End the command where the database is not a file."""
+    """End the command if the database is not a file."""
     from storage.engine.postgresql.connect import is_on_server  # start-up time: most commands open no database
 
     if is_on_server(url):
@@ -148,17 +148,17 @@ def require_file(url: str, instead: str) -> None:
 
 
 def print_line(text: str) -> None:
-    """A line on standard output, however narrow the terminal is."""
+    """Print a line on standard output, unwrapped in a narrow terminal too."""
     out.print(text, markup=False, soft_wrap=True)
 
 
 def say(text: str) -> None:
-    """A line on standard error, names of files as they are."""
+    """Print a line on standard error, with file names unchanged."""
     err.print(text, markup=False, soft_wrap=True)
 
 
 def spinning(console: Console) -> Progress:
-    """A bar of how far a simulation has come."""
+    """Context with a bar of a simulation's progress."""
     columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
     return Progress(*columns, console=console, transient=True)
 
@@ -173,7 +173,7 @@ _OPTIONS = {"url": (Url, URL), "key": (Key, None), "patience": (Patience, 10.0)}
 
 
 def asking(command: Callable[..., None]) -> Callable[..., None]:
-    """The command with --url, --key and --patience in the place of its first parameter, the service that they make."""
+    """The command with --url, --key and --patience in place of its first parameter, the service made from them."""
     _, *parameters = inspect.signature(command, eval_str=True).parameters.values()
     kind = inspect.Parameter.KEYWORD_ONLY
     shared = [inspect.Parameter(name, kind, default=usual, annotation=of) for name, (of, usual) in _OPTIONS.items()]
@@ -189,7 +189,7 @@ def asking(command: Callable[..., None]) -> Callable[..., None]:
 
 
 def listed(items: Iterable[Any], as_json: bool, show: Callable[[list[Any]], object], nothing: str) -> None:
-    """A list as JSON or as it is shown; without items the line that says so."""
+    """Print a list as JSON or by `show`; without items, the line that says so."""
     items = list(items)
     if as_json:
         out.print_json(json.dumps(items))

@@ -31,13 +31,14 @@ _LENGTH = "document.querySelector({selector!r}) && document.getElementById('repo
 
 
 class ReportError(ValueError):
-    """A report that cannot be printed or sent, and why."""
+    """A report cannot be printed or sent; the message says why."""
 
 
 def print_pages(http: "httpx2.Client", pages: Mapping[Path, tuple[str, str]]) -> None:
-    """Print pages of a service, by file: the address, and what the printed part of the page has once it is whole.
+    """Print pages of a service to files; `pages`: by file, the address, and the element that shows that the page is
+    complete.
 
-    Raises ReportError where there is no browser, or where a page is not there after five minutes.
+    Raises ReportError if there is no browser, or if a page is not complete after five minutes.
     """
     with _browser() as browser:
         for path, (address, selector) in pages.items():
@@ -75,7 +76,7 @@ def sent(url: str, files: Sequence[Path]) -> None:
 
 
 class _Browser:
-    """A browser at the other ends of two pipes: messages of JSON, a zero byte after each."""
+    """A connection to a browser by two pipes: JSON messages, each followed by a zero byte."""
 
     def __init__(self, asked: BinaryIO, answers: BinaryIO) -> None:
         self._asked, self._answers, self._numbers = asked, answers, count(1)
@@ -122,7 +123,7 @@ class _Page:
         return self._browser.ask(method, self._session, **parameters)
 
     def wait(self, length: str, address: str) -> None:
-        """Until the length that an expression gives is a number and has been the same for a while."""
+        """Wait until an expression gives a number (a length) that stays the same for a while."""
         began = since = time.monotonic()
         before = None
         while before is None or time.monotonic() - since < _STILL:
@@ -139,7 +140,7 @@ class _Page:
 
 @contextmanager
 def _browser() -> Iterator[_Browser]:
-    """A headless browser with a profile of its own, ended afterwards."""
+    """Context with a headless browser with its own profile, stopped at the end."""
     program = os.environ.get("CHROMIUM") or next(filter(None, map(shutil.which, _BROWSERS)), None)
     if program is None:
         raise ReportError("--pdf needs Chromium or Chrome on the path, or named by $CHROMIUM")

@@ -59,7 +59,7 @@ def report(
 
 
 def _written(service: Service, names: Sequence[str], folder: Path, *, pdf: bool) -> list[Path]:
-    """The files of one report: the day is in their names, and a second one of a day replaces the first."""
+    """Write the files of one report. Their names have the day, so a second report of a day replaces the first."""
     clutches = [service.get(f"/v1/clutches/{name}") for name in names] or list(service.pages("/v1/clutches"))
     alarms = [event for event in service.pages("/v1/alarms/events") if not names or event["clutch_id"] in names]
     folder.mkdir(parents=True, exist_ok=True)

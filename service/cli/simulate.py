@@ -146,7 +146,7 @@ def simulate(
 
 
 def _run_plan(folder: Path, plan: Path, alternative: int) -> None:
-    """One test of a plan on the clutch of a campaign that was simulated into the folder, as its `answer.json` has it."""
+    """Run one test of a plan on the clutch of a simulated campaign, as described in the folder's `answer.json`."""
     from models.rig import campaign, hidden, stationary, temperatures  # start-up time
     from models.rig.programme import Ageing  # start-up time
     from service.runs import simulated  # start-up time
@@ -201,7 +201,7 @@ def _programme(
 
 
 def _sizes(hide: list[str]) -> dict[str, float]:
-    """The effects that are to be hidden by slug, with their sizes; their usual ones where none is given."""
+    """The effects to hide by slug, with their sizes; the usual size if none is given."""
     from models.rig import hidden  # start-up time
 
     sizes = {}
@@ -216,7 +216,7 @@ def _sizes(hide: list[str]) -> dict[str, float]:
 
 
 def _write(folder: Path, run: "SimulatedRun", record_format: "RecordFormat") -> list[JsonObject]:
-    """One run into one file; its entry for the manifest, where it is not JSON."""
+    """Write a run into a file; returns its entry for the manifest unless it is JSON."""
     from service.runs import record_writer, simulated  # start-up time
 
     if record_format is record_writer.RecordFormat.JSON or run.duty is not None:

@@ -12,7 +12,7 @@ UNKNOWN = "unknown"
 
 
 def show_table(columns: Sequence[str], rows: Iterable[Sequence[str]], *, left: int = 1) -> None:
-    """Print a table, a line a row however narrow the terminal is: `left` columns of words, then columns of numbers."""
+    """Print a table, one line per row even in a narrow terminal: `left` columns of words, then columns of numbers."""
     lines = [columns, *rows]
     widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
     for place, line in enumerate(lines):
@@ -24,21 +24,21 @@ def show_table(columns: Sequence[str], rows: Iterable[Sequence[str]], *, left: i
 
 
 def number(value: float | None, digits: int = 3) -> str:
-    """A number with so many digits, "-" where there is none."""
+    """A number with this many digits; "-" for None."""
     if value is None:
         return "-"
     return f"{value:,.0f}" if 100 <= abs(value) < 1e6 else f"{value:.{digits}g}"
 
 
 def chance(value: float | None) -> str:
-    """A probability in per cent, never rounded to certainty; "-" where there is none."""
+    """A probability in per cent, never rounded to 0 or 100 %; "-" for None."""
     if value is None:
         return "-"
     return "> 99 %" if value > 0.995 else "< 1 %" if value < 0.005 else f"{100 * value:.0f} %"
 
 
 def with_deviation(value: float | None, deviation: float | None) -> str:
-    """A value with its standard deviation, to the deviation's second digit; "-" where there is none."""
+    """A value with its standard deviation, rounded to the deviation's second digit; "-" for None."""
     if value is None:
         return "-"
     if deviation is None or not deviation > 0.0 or not math.isfinite(deviation):
@@ -48,12 +48,12 @@ def with_deviation(value: float | None, deviation: float | None) -> str:
 
 
 def coefficient(value: float, deviation: float) -> str:
-    """A coefficient with its standard deviation; one that is less than this is not known."""
+    """A coefficient with its standard deviation; "-" if it is smaller than the deviation."""
     return UNKNOWN if deviation > abs(value) else with_deviation(value, deviation)
 
 
 def cycles(value: float | None) -> str:
-    """Duty cycles in whole numbers; one that is null lies beyond the horizon, up to which ends are predicted."""
+    """Duty cycles as whole numbers; null means beyond the horizon of predictions."""
     return BEYOND_HORIZON if value is None else f"{value:,.0f}"
 
 

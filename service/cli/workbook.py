@@ -21,7 +21,7 @@ _HEAD = '<?xml version="1.0" encoding="UTF-8" standalone="yes"?>'
 
 
 def write_workbook(path: Path, sheets: Mapping[str, Iterable[Sequence[str]]]) -> None:
-    """Write rows of texts by sheet, the same bytes for the same rows; a text that is a finite number becomes one."""
+    """Write rows of texts by sheet, reproducibly to the byte; a text that is a finite number becomes a number cell."""
     names = dict(enumerate((name[:_MAX_NAME] for name in sheets), start=1))
     types = "".join(
         f'<Override PartName="/xl/worksheets/sheet{n}.xml" ContentType="{_TYPES}.worksheet+xml"/>' for n in names
@@ -51,7 +51,7 @@ def write_workbook(path: Path, sheets: Mapping[str, Iterable[Sequence[str]]]) ->
 
 
 def _entry(name: str) -> zipfile.ZipInfo:
-    """A part dated 1980, the format's zero: the same tables are the same bytes, whenever they are written."""
+    """A part of the archive dated 1980 (the format's zero), so that equal tables give equal bytes."""
     entry = zipfile.ZipInfo(name)
     entry.compress_type = zipfile.ZIP_DEFLATED
     return entry

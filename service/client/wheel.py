@@ -6,9 +6,9 @@ from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 
 class ClientBesideService(BuildHookInterface):  # type: ignore[misc]
-    """Adds the folder to wheels that are copied. Hatchling is there only while one is built."""
+    """A build hook that adds the client's folder to copied wheels. Hatchling is available only while a wheel is built."""
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
-        """Called before a wheel is built; `version` is `standard` or `editable`."""
+        """Add the folder; called before a wheel is built, with `version` `standard` or `editable`."""
         if version == "standard":
             build_data["force_include"]["service/client/clutchlife"] = "clutchlife"

@@ -34,8 +34,8 @@ Value = tuple[float, float]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LevelFit:
-    """A pressure level's fit, the pressure measured there on average [Pa], and how many distinct speeds it saw; its
-    `measured` points where the fit leaves the static torque open or at zero, for mean COF to be taken from."""
+    """A pressure level's fit, the mean measured pressure [Pa] and the number of distinct speeds; `measured` points, for
+    mean COF, if the fit leaves the static torque open or at zero."""
 
     fit: StribeckFit
     mean_pressure: float
@@ -44,7 +44,7 @@ class LevelFit:
 
     @classmethod
     def of(cls, fit: StribeckFit, curve: Curve) -> "LevelFit":
-        """The level of a curve and its fit."""
+        """The level for a curve and its fit."""
         none_at_rest = fit.parameters.static_torque <= NO_STATIC_TORQUE * math.sqrt(float((curve.torque**2).mean()))
         open_at_rest = none_at_rest or "static_torque" in fit.undetermined
         return cls(
@@ -75,8 +75,8 @@ class Analysis:
     engagement: Engagement | None = None
 
     def details_to_store(self, run: IncomingRun) -> dict[str, object]:
-        """What is kept beside a run's channels: what was sent with them, its range of speeds [rad/s] and its oil [K], the
-        course of an engagement."""
+        """Fields stored with a run's channels: the other sent fields, its range of speeds [rad/s], its oil temperature
+        [K], and the course of an engagement."""
         details = dict(run.details) | {"origin": run.origin}
         if run.file is not None:
             details["file"] = dict(run.file)
@@ -92,11 +92,11 @@ class Analysis:
 
 
 def analyse(run: IncomingRun, geometry: Geometry, torque_filter: float) -> Analysis:
-    """Fit a stationary test's curves, from its plateaus or from its sampled record, and evaluate the engagement of a block
-    of duty; other kinds and tests of the open clutch have neither. `torque_filter` [s]: the time constant of the torque
-    channel's own low-pass, taken off a sampled test; an engagement stays as it was recorded.
+    """Fit a stationary test's curves, from its plateaus or its sampled record, or evaluate the engagement of a block of
+    duty; other kinds and tests of the open clutch give neither. `torque_filter` [s]: the time constant of the torque
+    channel's own low-pass, corrected for in a sampled test; an engagement is evaluated as recorded.
 
-    Raises InvalidError where a sampled record holds no steady plateau.
+    Raises InvalidError if a sampled record holds no steady plateau.
     """
     if run.kind != "stationary_stribeck":
         engagement = evaluated(run, geometry)
@@ -122,7 +122,7 @@ def analyse(run: IncomingRun, geometry: Geometry, torque_filter: float) -> Analy
 
 
 def levels_of(plateaus: Plateaus, geometry: Geometry) -> tuple[LevelFit, ...]:
-    """The curves of a stationary test fitted, pressures ascending."""
+    """Fits of a stationary test's curves, in ascending order of pressure."""
     curves = curves_by_pressure(plateaus, geometry)
     return tuple(LevelFit.of(fit, curve) for fit, curve in zip(fit_curves(curves), curves, strict=True))
 
@@ -130,8 +130,9 @@ def levels_of(plateaus: Plateaus, geometry: Geometry) -> tuple[LevelFit, ...]:
 def loops_of(
     channels: Mapping[str, FloatArray], geometry: Geometry, torque_filter: float, levels: Sequence[LevelFit]
 ) -> tuple[FrictionLoop, ...]:
-    """The friction loops of a dynamic test, with the lag behind the curves of its stationary test and beyond the torque
-    channel's own, of `torque_filter` [s]. What a curve's covariance leaves open makes the lag less certain, or unresolved.
+    """The friction loops of a dynamic test, with the lag relative to the curves of its stationary test, corrected for
+    the torque channel's own filter of `torque_filter` [s]. The covariance of the curves makes the lag less certain, or
+    unresolved.
     """
     curves = {level.fit.pressure: StationaryCurve.of(level.fit) for level in levels if level.speeds >= FEWEST_SPEEDS}
     return evaluate_loops(filtered_as_torque(sampled_record(channels), torque_filter), geometry, curves or None)
@@ -174,9 +175,9 @@ def mean_cofs(
     geometry: Geometry,
     raised: Callable[[float], FloatArray] | None = None,
 ) -> dict[float, Value]:
-    """Mean COF over the protocol's velocities [m] m/s and its deviation by pressure [Pa], where a level determines it: of
-    the fitted curve, or of the measured points where that has no static torque to go by. `raised` gives at a pressure [Pa]
-    what friction is there of eq. 3 [m]."""
+    """Mean COF over the protocol's velocities [m] m/s with its standard deviation, by pressure [Pa], for levels that
+    determine it: from the fitted curve, or from the measured points if the curve has no static torque.
+    `raised(pressure)` is the ratio of friction to eq. 3 [m]."""
     usable = [level for level in levels if level.speeds >= FEWEST_SPEEDS]
     if not usable:
         return {}
@@ -197,7 +198,7 @@ def mean_cofs(
 
 
 def _without_mean(levels: Sequence[LevelFit], others: bool) -> list[Notice]:
-    """That levels have no mean COF and why, whether the test counts by `others` or does not count."""
+    """The warning that levels have no mean COF, with advice; without `others`, that the test does not count."""
     if not levels:
         return []
     few = all(level.speeds < FEWEST_SPEEDS for level in levels)
@@ -214,7 +215,7 @@ def _without_mean(levels: Sequence[LevelFit], others: bool) -> list[Notice]:
 
 
 def _level_warnings(level: LevelFit, plateaus: Plateaus) -> list[Notice]:
-    """A level over whose rows the pressure varies widely may be several that ran together."""
+    """Warnings of levels with widely varying pressure: each may be several levels merged into one."""
     near = np.abs(plateaus.pressure - level.fit.pressure) <= WIDE_LEVEL * level.fit.pressure
     rows = int(np.count_nonzero(near))
     if rows >= level.fit.points:
@@ -235,7 +236,8 @@ def _oil_range(plateaus: Plateaus) -> Value | None:
 
 
 def _oil_moves(oil_range: Value | None) -> list[Notice]:
-    """Oil whose temperature changes within a test by more than two tests of a life may be apart."""
+    """The warning of a stationary test during which the oil temperature changes by more than the difference allowed
+    between two comparable tests."""
     low, high = oil_range or (0.0, 0.0)
     if high - low <= OTHER_OIL:
         return []

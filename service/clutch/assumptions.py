@@ -37,8 +37,8 @@ Course: TypeAlias = Callable[[FloatArray, float], FloatArray]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ModelInForce:
-    """The model as answers name it, the weights of its draws, its course (None: eq. 6 alone), the exponent of an adopted
-    load severity, and in sentences what it takes off the measurements."""
+    """The model in force: its name in answers, the weights of its draws, its added course of mean COF (None: eq. 6
+    alone), the exponent of an adopted load severity, and sentences on its corrections of measurements."""
 
     name: ModelName = BASELINE
     weights: tuple[float, ...] = (1.0,)
@@ -49,7 +49,8 @@ class ModelInForce:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LearnedPrior:
-    """The prior that a fleet has taught (None: the weak one alone), its lives that have ended, and its public name."""
+    """The prior learned from a fleet (None: the weak one alone), the fleet's ended lives, and the prior's name in
+    answers."""
 
     fleet: FleetPrior | None = None
     ended: tuple[ObservedLife, ...] = ()
@@ -58,13 +59,13 @@ class LearnedPrior:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scale:
-    """ζ over cycles since new: a life begins at `origin`, and `severity` leads on from the cycles since."""
+    """The conversion between cycles since new and ζ, for a life that begins at `origin`."""
 
     origin: float
     severity: SeverityMap = IDENTITY
 
     def progress(self, cycles: FloatArray | float) -> FloatArray:
-        """ζ at cycles since new, any shape; 0 before the origin."""
+        """ζ at cycles since new, of any shape; 0 before the origin."""
         return self.severity.progress(np.maximum(np.asarray(cycles) - self.origin, 0.0))
 
     def cycles(self, progress: FloatArray | float) -> FloatArray:
@@ -74,7 +75,8 @@ class Scale:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Assumptions:
-    """What ζ counts (`severity`), the fleet's prior beside the weak one, and the model in force.
+    """The assumptions of tracking: the severity measure that ζ counts, the fleet's prior beside the weak one, and the
+    model in force.
 
     The model's course is taken off measured mean COF before eq. 6 is tracked, and put back to look for the threshold.
     """
@@ -85,47 +87,47 @@ class Assumptions:
 
     @property
     def counts_cycles(self) -> bool:
-        """Whether ζ is the count of cycles, whatever the duty."""
+        """Whether ζ counts plain cycles, irrespective of duty."""
         return self.severity.basis is SeverityBasis.CYCLES
 
     def scale(self, origin: float, blocks: Sequence[Block]) -> Scale:
-        """ζ over cycles since new for a life that began at `origin`, by its blocks of duty."""
+        """The scale between cycles since new and ζ of a life that began at `origin`, from its blocks of duty."""
         since = [] if self.counts_cycles else [block.since(origin) for block in blocks if block.end > origin]
         return Scale(origin=origin, severity=severity_map(self.severity, since))
 
     def priors(self, quantity: str, first: Measurement, scale: Scale) -> dict[str, TrackPrior]:
-        """The priors of a series by name; its first measurement gives their size."""
+        """The priors of a series by name, scaled to its first measurement."""
         fleet = self.prior.fleet
         if fleet is None or quantity != MEAN_COF:
             return {WEAK: weak(first, falling=quantity == MEAN_COF)}
         return {WEAK: weak(first, falling=True), FLEET: fleet.in_unit(scale.severity.unit).prior_for(first)}
 
     def weighted_priors(self, quantity: str, first: Measurement, scale: Scale) -> tuple[tuple[float, TrackPrior], ...]:
-        """The priors of a series, each with its share."""
+        """The priors of a series, each with its prior probability."""
         priors, fleet = self.priors(quantity, first, scale), self.prior.fleet
         share = 0.0 if fleet is None or FLEET not in priors else fleet.share
         return tuple((share if name == FLEET else 1.0 - share, prior) for name, prior in priors.items())
 
     def pooled(self, posteriors: Mapping[str, TrackPosterior], first: Measurement, scale: Scale) -> TrackPosterior:
-        """The posteriors under each of `priors` as one, weighted by their evidence."""
+        """The mixture of the posteriors under each of `priors`, weighted by their evidence."""
         fleet = self.prior.fleet
         if fleet is None or FLEET not in posteriors:
             return posteriors[WEAK]
         return fleet.in_unit(scale.severity.unit).together(posteriors[WEAK], posteriors[FLEET], first)
 
     def ended(self, series_of: tuple[str, float], fraction: float, scale: Scale) -> list[ObservedLife]:
-        """The fleet's ended lives by the same criterion: of mean COF over all pressures, none of another quantity."""
+        """The fleet's ended lives for this criterion; there are some only for mean COF over all pressures."""
         if series_of != (MEAN_COF, ALL_PRESSURES):
             return []
         return [life.in_unit(scale.severity.unit) for life in self.prior.ended if life.fraction == fraction]
 
     def corrects_oil(self, quantity: str) -> bool:
-        """Whether the model in force frees a quantity of the temperature of the oil that it was measured in."""
+        """Whether the model in force corrects a quantity for the oil temperature of its measurement."""
         return quantity == MEAN_COF and "oil_temperature" in self.model.name.effects
 
     def offsets(self, quantity: str, pressure: float, cycles: FloatArray) -> FloatArray:
-        """What the model in force adds to a quantity under each of its draws at cycles since new [m]; [d, m], [1, m] where
-        it adds nothing."""
+        """The model's additive correction of a quantity at cycles since new [m], under each of its draws [d, m]; zeros
+        [1, m] if it has none."""
         if self.model.course is None or quantity != MEAN_COF:
             return np.zeros((1, *cycles.shape))
         return self.model.course(cycles, pressure)
@@ -137,19 +139,19 @@ class Assumptions:
 
 
 def severity_name(severity: Severity) -> SeverityName:
-    """What eq. 6 counts, as answers name it."""
+    """The severity measure that eq. 6 counts, as named in answers."""
     return SeverityName(basis=severity.basis.value, exponent=severity.exponent)
 
 
 def severity_under(record: ClutchIn, exponent: float | None) -> Severity:
-    """What ζ counts: by the clutch's record, or by the exponent of an adopted load severity."""
+    """The severity measure that ζ counts: of the clutch's record, or with the exponent of an adopted load severity."""
     if exponent is None:
         return record.severity.to_model()
     return Severity(basis=SeverityBasis.DISSIPATED_ENERGY, exponent=exponent)
 
 
 def kind_of(record: ClutchIn, severity: Severity) -> Kind:
-    """What clutches must have in common to teach each other; a simulated one teaches no measured one."""
+    """The properties that clutches must share to learn from each other; simulated and measured clutches never do."""
     return Kind(
         friction_material=record.friction_material,
         reaction_plate=record.reaction_plate,
@@ -160,5 +162,5 @@ def kind_of(record: ClutchIn, severity: Severity) -> Kind:
 
 
 def may_be_of(record: ClutchIn, kind: Kind) -> bool:
-    """Whether a clutch is of that kind but for its severity, which follows from what was adopted, too."""
+    """Whether a clutch is of that kind, disregarding its severity measure, which also depends on adopted models."""
     return kind_of(record, Severity()).model_copy(update={"severity": kind.severity}) == kind

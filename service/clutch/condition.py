@@ -54,7 +54,7 @@ RANK_UNKNOWN, RANK_ENDED = 2 * HORIZON, 3 * HORIZON
 
 
 def rank_of(summary: Mapping[str, Any]) -> float:
-    """Where a clutch comes among those in its state: the fewer cycles it is safe for, held runs considered, the earlier."""
+    """The clutch's sort key among those in its state: the safe bound on remaining cycles, with held runs considered."""
     if summary.get("ended") is not None:
         return RANK_ENDED
     if summary.get("status", INSUFFICIENT) == INSUFFICIENT:
@@ -65,8 +65,8 @@ def rank_of(summary: Mapping[str, Any]) -> float:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BesidePrediction:
-    """What an answer says beside its prediction: the safe bound and its date, the held runs and a warning about them (None:
-    none is held), and the remaining life in a sentence."""
+    """The fields of an answer beside its prediction: the safe bound and its date, the effect of held runs with a
+    warning (None: none is held), and a sentence on the remaining life."""
 
     at_least: float | None
     at_least_at: str | None
@@ -76,7 +76,7 @@ class BesidePrediction:
     warning: Warned | None
 
     def of(self, prediction: LifePrediction) -> Mapping[str, Any]:
-        """These fields of an answer with its prediction."""
+        """These fields, as fields of an answer that contains the prediction."""
         own: dict[str, Any] = {name: getattr(self, name) for name in BESIDE}
         return own | {"warnings": [*prediction.warnings, *([] if self.warning is None else [self.warning])]}
 
@@ -84,9 +84,9 @@ class BesidePrediction:
 def with_held_runs(
     payload: Mapping[str, Any], summary: Mapping[str, Any], among: Mapping[str, Any] | None, count: int
 ) -> BesidePrediction:
-    """`held_runs` with what these, `count`, would make of a prediction, which is `among` (None: none is held), and the safe
-    bound as the lower of both, with its date at the pace of the runs; `summary` is that of the clutch, empty where the
-    answer is of an earlier time or life."""
+    """The fields beside a prediction. `among` is the prediction with the `count` held runs counted (None: none is
+    held); the safe bound is the lower of both, with its date at the pace of the runs. `summary` is the clutch's, empty
+    if the answer is of an earlier time or life."""
     held_runs, warning = None, None
     if among is not None:
         held_runs = HeldRuns(count=count, status=among["status"], remaining_cycles=among["remaining_cycles"])
@@ -106,8 +106,8 @@ def with_held_runs(
 
 
 def pace_in_words(pace: Mapping[str, float] | None, cycles: float | None) -> str | None:
-    """Cycles as days at the pace of the runs, and the day that they count from: no answer depends on today's date, which may
-    be long after the last run. None where either is unknown."""
+    """Cycles converted to days at the pace of the runs, and the day from which they count; None if either is unknown.
+    Answers do not depend on today's date, which may be long after the last run."""
     since = None if pace is None or cycles is None else date_of(pace["moment"])
     if pace is None or cycles is None or since is None:
         return None
@@ -118,7 +118,7 @@ def pace_in_words(pace: Mapping[str, float] | None, cycles: float | None) -> str
 
 
 def stated(summary: Mapping[str, Any]) -> ClutchSummary | None:
-    """A clutch's summary as lists show it; None before the first run that counts."""
+    """A clutch's summary as lists show it; None before the first accepted run."""
     if "status" not in summary:
         return None
     beside = with_held_runs(summary, summary, _with_held(summary), summary.get("held", 0))
@@ -127,29 +127,31 @@ def stated(summary: Mapping[str, Any]) -> ClutchSummary | None:
 
 
 def lower_bound(at_least: float | None, among: Mapping[str, Any] | None) -> float | None:
-    """The lower of a safe bound and that with the held runs, None where neither is known."""
+    """The lower of two safe bounds, without and with the held runs; None if neither is known."""
     bounds = [at_least, None if among is None else among["at_least"]]
     return min((bound for bound in bounds if bound is not None), default=None)
 
 
 def _with_held(summary: Mapping[str, Any]) -> Mapping[str, Any] | None:
-    """The shown prediction with the held runs; None where none is held."""
+    """The shown prediction with the held runs counted; None if no run is held."""
     return (summary.get("with_held") or {}).get(SHOWN)
 
 
 def bound_of(summary: Mapping[str, Any]) -> float | None:
-    """The safe bound of a summary, held runs considered; None where it is not known."""
+    """The safe bound of a summary, with held runs considered; None if it is unknown."""
     return lower_bound(summary["at_least"], _with_held(summary))
 
 
 def median_of(summary: Mapping[str, Any]) -> float:
-    """The median of the remaining cycles, the lower of both where runs are held; at most the horizon."""
+    """The median of remaining cycles, at most the horizon; if runs are held, the lower of the medians without and with
+    them."""
     medians = [each["remaining_cycles"]["0.5"] for each in (summary, _with_held(summary)) if each is not None]
     return min((float(median) for median in medians if median is not None), default=HORIZON)
 
 
 def _warning_about_held_runs(payload: Mapping[str, Any], among: Mapping[str, Any], count: int) -> Warned:
-    """What held runs would make of an answer, by all that it states: where both are unknown the safe bounds may differ."""
+    """The warning about held runs, with their effect on the prediction; the safe bounds may differ even if both
+    remaining lives are unknown."""
     if all(among[name] == payload[name] for name in ("status", "remaining_cycles", "at_least")):
         effect = f"the remaining life would be the same with {_them(count)}"
     elif among["status"] == REACHED:
@@ -164,7 +166,7 @@ def _warning_about_held_runs(payload: Mapping[str, Any], among: Mapping[str, Any
 
 
 def held_runs_left_out(count: int) -> list[Warned]:
-    """The warning of an answer that is without so many held runs; none where none is held."""
+    """The warning of an answer that leaves this many held runs out; empty if none is held."""
     message = f"{held_in_words(count)}: this is without {_them(count)}"
     return [Warned(code=HELD_RUNS, message=message)] if count else []
 
@@ -178,8 +180,9 @@ def held_in_words(count: int) -> str:
 
 
 def state_of(summary: Mapping[str, Any], *, disputed: bool, silent: str | None = None) -> dict[str, str]:
-    """A clutch's state after NAMUR NE 107 by its summary, and why; `disputed`: its newest diagnosis found that data and
-    model disagree, and nobody has acted on it; `silent`: since when its rig has sent nothing, where that is an alarm."""
+    """A clutch's state by NAMUR NE 107 with the reason, from its summary; `disputed`: its newest diagnosis found that
+    data and model disagree, and nobody has acted on it; `silent`: the time of the last message, if the rig's silence is
+    an alarm."""
     name, reason = _state_and_reason(summary, disputed=disputed, silent=silent)
     if reason or "status" not in summary:
         return {"name": name, "why": reason}
@@ -187,7 +190,8 @@ def state_of(summary: Mapping[str, Any], *, disputed: bool, silent: str | None =
 
 
 def _state_and_reason(summary: Mapping[str, Any], *, disputed: bool, silent: str | None) -> tuple[str, str]:
-    """The first state that holds, and why as a clause; no reason where the statement of the remaining life is one."""
+    """The first state with a true condition, and its reason as a clause; the reason is empty if the statement of the
+    remaining life serves as one."""
     held = summary.get("held", 0)
     if "damaged" in summary:
         return CHECK, f"its stored results are damaged: {summary['damaged']}"
@@ -209,7 +213,7 @@ def _state_and_reason(summary: Mapping[str, Any], *, disputed: bool, silent: str
 
 
 def silence_in_words(since: str) -> str:
-    """The clause that says that no run has arrived since a moment (ISO 8601)."""
+    """The clause stating that no run has arrived since a moment (ISO 8601)."""
     return f"the rig is silent, no run arrived since {since[:16].replace('T', ' ')} UTC"
 
 
@@ -221,9 +225,9 @@ def top_line(
     silent: str | None = None,
     raised: int = 0,
 ) -> dict[str, str]:
-    """What stands first on a clutch's page and in `clutchlife status`: `headline`, its state in words, the safe bound in
-    cycles and days, and the median; `action`, what to do. `diagnosis`: the newest one as it goes out; `raised`: how many
-    alarms nobody has acknowledged."""
+    """The first lines of a clutch's page and of `clutchlife status`: `headline`, its state in words, the safe bound in
+    cycles and days, and the median; `action`, a recommendation. `diagnosis`: the newest one as sent to clients;
+    `raised`: the number of unacknowledged alarms."""
     name, reason = _state_and_reason(summary, disputed=disputed, silent=silent)
     words = STATE_WORDS[name]
     if "status" not in summary:
@@ -239,7 +243,8 @@ def top_line(
 
 
 def _numbers_in_words(summary: Mapping[str, Any], at_least: float | None, paced: str | None) -> str:
-    """The safe bound (both, where held runs lower it), its days and the median; the statement where there is no number."""
+    """The safe bound (both, if held runs lower it), its days and the median; the statement of the remaining life if
+    there is no number."""
     own = summary["at_least"]
     if own is not None and own >= 1.0 and at_least is not None and at_least < own:
         runs = "the held run counts" if summary.get("held") == 1 else "the held runs count"
@@ -257,7 +262,8 @@ def _numbers_in_words(summary: Mapping[str, Any], at_least: float | None, paced:
 
 
 def _action(name: str, summary: Mapping[str, Any], soon: str, diagnosis: LatestDiagnosis | None, raised: int) -> str:
-    """What to do about a state, in one sentence; `soon`: how soon. Alarms ask for somebody where the state does not."""
+    """The recommended action for a state, in one sentence; `soon`: how soon. Alarms ask for attention even if the state
+    does not."""
     held = summary.get("held", 0)
     if summary.get("ended") and not held:
         return "Its life has ended: record the rebuild, or archive it."
@@ -303,7 +309,7 @@ def _action(name: str, summary: Mapping[str, Any], soon: str, diagnosis: LatestD
 
 
 def _test_in_words(test: str) -> str:
-    """An advised test; of a long protocol, which the diagnosis shows whole, its first test."""
+    """An advised test in words; for a long protocol, which the diagnosis shows in full, its first test."""
     test = test.removeprefix("the ")
     if not test.startswith(("stationary", "dynamic")):
         return test
@@ -322,7 +328,7 @@ def _cause_in_words(slug: str) -> str:
 
 
 def _tests(summary: Mapping[str, Any]) -> str:
-    """How many of the tests that a prediction needs there are, as a clause."""
+    """The number of present tests out of those needed for a prediction, as a clause."""
     places, left_out = _distinct_test_cycles(summary), _tests_unlike_first(summary)
     known = f"{places} of the {FEWEST_TESTS} tests that a prediction needs"
     if places < summary["runs_used"]:
@@ -331,17 +337,18 @@ def _tests(summary: Mapping[str, Any]) -> str:
 
 
 def _distinct_test_cycles(summary: Mapping[str, Any]) -> int:
-    """At how many different cycles there are tests that count; of a summary that does not state it, how many tests count."""
+    """The number of different cycles with counted tests; for an older summary without it, the number of counted tests."""
     return int(summary.get("places", summary.get("runs_used", 0)))
 
 
 def _tests_unlike_first(summary: Mapping[str, Any]) -> int:
-    """How many tests cannot be compared with the first."""
+    """The number of tests that cannot be compared with the first."""
     return int(summary.get("tests", 0) - summary.get("runs_used", 0)) if "tests" in summary else 0
 
 
 def _near_end(summary: Mapping[str, Any]) -> str | None:
-    """Why a predicted end is near, by the share of life left at the safe bound or by a quantity's limit; None: it is not."""
+    """The reason why a predicted end is near, by the share of life left at the safe bound or by a quantity's limit;
+    None if it is not near."""
     age = summary["as_of_cycles"] - summary["from_cycles"]
     if summary["at_least"] < SOON * (age + summary["at_least"]):
         return f"less than {100 * SOON:.0f} % of its life may be left"
@@ -352,8 +359,8 @@ def _near_end(summary: Mapping[str, Any]) -> str | None:
 
 
 def statement_of(payload: Mapping[str, Any], at_least: float | None) -> str:
-    """What is known of the remaining life as a sentence: its safe bound, which held runs may lower, and how probable an end
-    is that is left open."""
+    """A sentence on the remaining life: its safe bound, which held runs may lower, and the probability of an end within
+    the horizon if that is open."""
     bound, own = bound_in_words(at_least), payload["at_least"]
     if own is not None and bound != bound_in_words(own):
         bound += ", if held runs count"
@@ -370,20 +377,22 @@ def statement_of(payload: Mapping[str, Any], at_least: float | None) -> str:
 
 
 def untested_since(payload: Mapping[str, Any]) -> float | None:
-    """The cycles of the last test where a reached end is predicted to lie after it: no measurement has seen it."""
+    """The cycles of the last test, if the predicted end of life lies after it, so that no measurement confirms it; else
+    None."""
     tested, end = payload["current"]["measured_at_cycles"], payload.get("end_of_life_cycles", {}).get("0.5")
     return tested if tested is not None and end is not None and end > tested else None
 
 
 def _left_open(bound: str, payload: Mapping[str, Any]) -> str:
-    """An interval that reaches the horizon: its safe bound is the number that counts, and how probable an end is."""
+    """The statement for an interval that reaches the horizon: the safe bound, and the probability of an end before the
+    horizon."""
     chance = chance_in_words(payload["probability_of_reaching"])
     within = f"the end comes within {payload.get('horizon_cycles', HORIZON):,.0f} cycles with a probability of {chance}"
     return f"{bound}; later tests will tell how many more ({within})"
 
 
 def bound_in_words(at_least: float | None) -> str:
-    """The safe bound of the remaining cycles, rounded down to two digits; a few are not counted out."""
+    """The safe bound of remaining cycles in words, rounded down to two digits; below FEW_CYCLES no number is given."""
     if at_least is None or at_least < 1.0:
         return "no further cycle is safe"
     shown = f"fewer than {FEW_CYCLES}" if at_least < FEW_CYCLES else rounded_down(at_least)
@@ -397,7 +406,7 @@ def rounded_down(cycles: float) -> str:
 
 
 def _second_digit(cycles: float) -> float:
-    """The unit of the second digit of a number of cycles, at least 1."""
+    """The unit of the second digit of a number of cycles of at least 1."""
     return float(10.0 ** max(0, math.floor(math.log10(cycles)) - 1))
 
 
@@ -413,14 +422,15 @@ def limit_in_words(criterion: Mapping[str, Any]) -> str:
 
 
 def chance_in_words(probability: float) -> str:
-    """A probability in per cent, never rounded to certainty."""
+    """A probability in per cent, never rounded to 0 or 100 %."""
     if probability > 0.995:
         return "more than 99 %"
     return "less than 1 %" if probability < 0.005 else f"{math.floor(100 * probability + 0.5)} %"
 
 
 def recent(events: Sequence[Event], series: Series) -> Recent:
-    """The run that was made last, and mean COF [-] of the present life as a short line, thinned evenly, its last value kept.
+    """The most recent run, and mean COF [-] of the present life as a sparkline, thinned evenly with its last value
+    kept.
 
     `events` is not empty; `series` is mean COF over the reference pressures, ordered by cycles.
     """

@@ -32,7 +32,7 @@ COURSE = "engagement_course"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Indicator:
-    """An indicator at the edge: public value = SI value / factor; its `field` in the models."""
+    """An engagement indicator as sent to clients: public value = SI value / factor; `field`: its name in the models."""
 
     field: str
     unit: str = "1"
@@ -64,14 +64,14 @@ ALL_INDICATORS: Mapping[str, Indicator] = {**INDICATORS, **COMPARED}
 
 
 def evaluated(run: IncomingRun, geometry: Geometry) -> Engagement | None:
-    """The engagement that a block of duty carries; None for a run without one."""
+    """The evaluated engagement of a block of duty; None for a run without one."""
     if run.kind not in DUTY_KINDS or not run.channels:
         return None
     return measured_engagement(sampled_record(run.channels), geometry)
 
 
 def engagement_notices(engagement: Engagement | None) -> list[Notice]:
-    """The warning of a record that was sent and holds no engagement."""
+    """The warning of a sent record in which no engagement was found."""
     if not isinstance(engagement, Refusal):
         return []
     message = f"the engagement is stored but not evaluated: {engagement.message}"
@@ -79,7 +79,7 @@ def engagement_notices(engagement: Engagement | None) -> list[Notice]:
 
 
 def engagement_item(engagement: Engagement) -> ReceivedEngagement:
-    """An engagement as a receipt shows it; null is what the record does not determine."""
+    """An engagement as a receipt shows it; undetermined values are null."""
     if isinstance(engagement, Refusal):
         return ReceivedEngagement(
             status=engagement.status.value,
@@ -105,7 +105,7 @@ def engagement_item(engagement: Engagement) -> ReceivedEngagement:
 def _indicator_items(
     found: EngagementIndicators | Comparison, indicators: Mapping[str, Indicator]
 ) -> dict[str, IndicatorEstimate | None]:
-    """Each indicator with its standard error in the public unit; null where it is not determined."""
+    """Each indicator with its standard error in its public unit; null if undetermined."""
     items: dict[str, IndicatorEstimate | None] = {}
     for name, indicator in indicators.items():
         estimate: ValueWithError | None = getattr(found, indicator.field)
@@ -117,7 +117,7 @@ def _indicator_items(
 
 
 def course_item(engagement: Engagement | None) -> dict[str, object]:
-    """What is kept of the sliding speed beside a run's channels; empty for a run without an engagement."""
+    """The course of the sliding speed, to be stored with a run's channels; empty for a run without an engagement."""
     if not isinstance(engagement, EngagementIndicators):
         return {}
     course = engagement.course
@@ -132,7 +132,7 @@ def course_item(engagement: Engagement | None) -> dict[str, object]:
 
 
 def public_channels(columns: Mapping[str, FloatArray]) -> dict[str, list[float]]:
-    """Channels of a trace [n] in SI by public name -> in their public units."""
+    """A trace's channels [n], converted from SI to their public units, by public name."""
     return {
         name: ((column - CHANNELS[name].offset) / CHANNELS[name].factor).round(6).tolist()
         for name, column in columns.items()
@@ -141,7 +141,7 @@ def public_channels(columns: Mapping[str, FloatArray]) -> dict[str, list[float]]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StoredEngagement:
-    """What is stored of a run with an engagement: its receipt, and the course of speed where it was evaluated."""
+    """A stored run with an engagement: its receipt, and the course of speed if it was evaluated."""
 
     receipt: Evaluation
     item: ReceivedEngagement
@@ -157,12 +157,12 @@ class StoredEngagement:
         return self.item.initial_speed_rpm or 0.0, self.item.maximum_pressure_bar or 0.0
 
     def has_duty_of(self, other: "StoredEngagement") -> bool:
-        """Whether it is of the same duty as another, both evaluated."""
+        """Whether both engagements are evaluated and have the same duty."""
         return all(same_duty(own, its) for own, its in zip(self.duty, other.duty, strict=True))
 
 
 def stored_engagement(receipt: Evaluation, details: Mapping[str, Any]) -> StoredEngagement | None:
-    """A stored run's engagement; None where it has none."""
+    """A stored run's engagement; None for a run without one."""
     if receipt.engagement is None:
         return None
     if COURSE not in details:

@@ -19,7 +19,7 @@ from service.errors import InvalidError
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class IncomingRun:
-    """One run as the rig sent it. `channels` are in the units of their names, `details` is what else was said.
+    """A run as the rig sent it. `channels` are in the units of their names, `details` is what else was said.
 
     `file` describes the file that it was read from (None: it was sent otherwise): `filename`, `sha256`, `bytes`, the `rig`
     whose profile was applied, `reading` (all by which it was read) and the `warnings` of reading. It is no part of the
@@ -38,7 +38,7 @@ class IncomingRun:
 
 
 def name_run(run: IncomingRun) -> IncomingRun:
-    """The run with its content's hash, and its name derived from that where none was given.
+    """The run with its content's hash and, if none was given, a name derived from it.
 
     Raises InvalidError where a stationary test holds neither a curve that could be fitted nor an open clutch, and where the
     time of a dynamic test steps back or stands still.
@@ -52,7 +52,8 @@ def name_run(run: IncomingRun) -> IncomingRun:
 
 
 def content_hash(run: IncomingRun) -> str:
-    """The sha256 of everything but the name: kind, cycles, instant, origin, details and every value of every channel."""
+    """The sha256 of a run's content without its name: kind, cycles, instant, origin, details and every value of every
+    channel."""
     return content_with_columns(
         [run.kind, run.cycles, instant(run.started_at), run.origin, dict(run.details)], run.channels
     )
@@ -72,14 +73,15 @@ def sampled_record(channels: Mapping[str, FloatArray]) -> Record:
 
 
 def _plate_temperature(si: Mapping[str, FloatArray]) -> FloatArray | None:
-    """The mean of the plate's thermometers [n] K, of the one where there is one; None without any."""
+    """The mean of the plate's thermometers [n] K; None if there is none."""
     measured = [si[name] for name in PLATE_TEMPERATURES if name in si]
     return np.asarray(sum(measured) / len(measured), dtype=np.float64) if measured else None
 
 
 @dataclass(frozen=True, slots=True)
 class SampledChannels:
-    """A sampled record whose channels become SI units as they are asked for: all at once would be two thirds more memory."""
+    """A sampled record with channels converted to SI units on access: converting all at once would need two thirds more
+    memory."""
 
     channels: Mapping[str, FloatArray]
 
@@ -118,8 +120,8 @@ class SampledChannels:
 
 
 def stationary_plateaus(channels: Mapping[str, FloatArray]) -> Plateaus:
-    """The plateaus of a stationary test in SI units, rows in the order they were sent. Deviations of torque have a least
-    value, and are ignored where one of them is 0: then no noise was measured."""
+    """The plateaus of a stationary test in SI units, rows as sent. Standard deviations of torque have a lower limit;
+    all are ignored if one is 0, because then noise was not measured."""
     si = {name: CHANNELS[name].to_si(values) for name, values in channels.items()}
     deviation = si.get("torque_sd_nm")
     if deviation is not None:
@@ -137,7 +139,7 @@ def stationary_plateaus(channels: Mapping[str, FloatArray]) -> Plateaus:
 
 
 def _require_forward(time: FloatArray) -> None:
-    """Refuse a record whose time steps back, for its order is not what it seems, or stands still from row to row."""
+    """Raise InvalidError if a record's time steps back or stands still between rows."""
     if stands(time):
         still = np.count_nonzero(np.diff(time) == 0)
         message = f"time_s does not advance in {still} of {time.size - 1} steps: send finer times"
@@ -155,7 +157,8 @@ def _require_forward(time: FloatArray) -> None:
 
 
 def _require_readings(channels: Mapping[str, FloatArray]) -> None:
-    """Refuse a test without information: no torque, an open clutch at rest, under pressure rows that make no curve."""
+    """Raise InvalidError if a test has no information: zero torque, an open clutch at rest, or pressed rows that form
+    no curve."""
     torque, speed, pressure = channels["torque_nm"], channels["speed_rpm"], channels["pressure_bar"]
     if (pressure * CHANNELS["pressure_bar"].factor >= UNLOADED).any():
         _require_curve(torque, speed, pressure)
@@ -178,7 +181,7 @@ def _require_curve(torque: FloatArray, speed: FloatArray, pressure: FloatArray) 
 
 
 def _refuse_all(name: str, column: FloatArray, code: str, rule: str) -> None:
-    """Refuse a column for the value that all its rows have."""
+    """Raise InvalidError for a column because of the value of all its rows."""
     rows = "" if column.size == 1 else f" in all {column.size} rows"
     _refuse(name, column, code, f"{rule}, got {column[0]:g}{rows}")
 

@@ -42,7 +42,7 @@ def receipt(
     cofs: ByPressure | None = None,
     loops: Sequence[FrictionLoop] = (),
 ) -> Evaluation:
-    """The receipt of a run by itself; its mean COFs and loops where they are known already."""
+    """The receipt of a run, with mean COFs and loops if they are known already."""
     file = run.file or {}
     return Evaluation(
         clutch_id=clutch_id,
@@ -68,7 +68,7 @@ def receipt(
 
 
 def date_notice(started_at: str | None, received_at: str) -> list[Notice]:
-    """The warning of a date that cannot be."""
+    """The warning of an impossible date."""
     if started_at is None or is_possible(started_at, received_at):
         return []
     started, received = (datetime.fromisoformat(each).timestamp() for each in (started_at, received_at))
@@ -81,12 +81,12 @@ def date_notice(started_at: str | None, received_at: str) -> list[Notice]:
 
 
 def fit_items(levels: Sequence[LevelFit], cofs: ByPressure) -> list[Fit]:
-    """The fits of a test as a receipt shows them, each with its mean COF where it determines one."""
+    """The fits of a test as a receipt shows them, with mean COF where it is determined."""
     return [_fit_item(level.fit, cofs.get(level.fit.pressure, (None, None))) for level in levels]
 
 
 def doubted(notices: Sequence[Notice]) -> list[dict[str, object]]:
-    """Notices as the doubts about a run, which are stored."""
+    """Notices in the form of stored doubts about a run."""
     return [
         {"code": notice.code, "message": notice.message}
         | ({} if notice.likely_cycles is None else {"likely_cycles": whole(notice.likely_cycles)})
@@ -95,12 +95,12 @@ def doubted(notices: Sequence[Notice]) -> list[dict[str, object]]:
 
 
 def warned(notices: Sequence[Notice]) -> list[Warned]:
-    """Notices as the warnings of an answer."""
+    """Notices in the form of an answer's warnings."""
     return [Warned(code=notice.code, message=notice.message) for notice in notices]
 
 
 def warnings_of_file(run: IncomingRun) -> list[Warned]:
-    """The warnings of reading the file that a run was sent as."""
+    """The stored warnings from reading the run's file."""
     return [Warned(code=each["code"], message=each["message"]) for each in (run.file or {}).get("warnings", ())]
 
 
@@ -146,7 +146,7 @@ def loop_items(loops: Sequence[FrictionLoop]) -> list[Loop]:
 
 
 def insufficient(assumptions: Assumptions, cycles: float | None, pressure: float, fraction: float) -> LifePrediction:
-    """The answer where nothing can be predicted: `insufficient_data`."""
+    """The answer with status `insufficient_data`, which predicts nothing."""
     return LifePrediction(
         as_of_cycles=None if cycles is None else whole(cycles),
         runs_used=0,
@@ -173,22 +173,23 @@ def insufficient(assumptions: Assumptions, cycles: float | None, pressure: float
 
 
 def share_of_way(value: float, initial: float, limit: float, *, rises: bool = False) -> float | None:
-    """Health by one criterion: the share, 0 to 1, that is left of the way from a quantity's initial value down to its limit
-    (up to it where it `rises`); None where it began at the limit or beyond."""
+    """Health by one criterion, 0 to 1: the remaining share of the way from a quantity's initial value down to its limit
+    (up to it if it `rises`); None if it began at the limit or beyond."""
     way, left = (limit - initial, limit - value) if rises else (initial - limit, value - limit)
     return min(1.0, max(0.0, left / way)) if way > 0.0 else None
 
 
 def safe_bound(end: float | None, now: float, origin: float) -> float:
-    """Cycles from `now` that are left with 95 %, by the 5 % quantile of the end of life in cycles since new; None of that
-    lies beyond the horizon of the life that began at `origin`."""
+    """The cycles left from `now` with 95 % probability, from the 5 % quantile of the end of life in cycles since new;
+    None if that lies beyond the horizon of the life that began at `origin`."""
     return max(0.0, (origin + horizon_at(now - origin) if end is None else end) - now)
 
 
 def ended(prediction: LifePrediction, end: Event | None) -> LifePrediction:
-    """A prediction after the declared `end` of its life (None: it goes on): nothing remains of a worn one.
+    """A prediction adapted to the declared `end` of its life (None: it goes on): after wear, the remaining life is
+    zero.
 
-    One that was taken out for another reason has no remaining life either; where it would have ended stays predicted.
+    A life that ended for another reason has no remaining life either, but keeps its predicted end of life.
     """
     if end is None or end.end is None:
         return prediction
@@ -218,5 +219,5 @@ def criterion_item(fraction: float, pressure: float, initial: float | None, thre
 
 
 def by_quantile(values: Mapping[float, float | None]) -> Quantiles:
-    """A number by quantile, in the public shape; null where there is none."""
+    """Numbers by quantile as sent to clients; null if missing."""
     return {f"{quantile:g}": values.get(quantile) for quantile in QUANTILES}

@@ -39,7 +39,7 @@ _log = logging.getLogger("clutchlife")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunReader:
-    """A clutch's runs as they were sent, read when they are asked for.
+    """A reader of a clutch's runs as sent, each read when needed.
 
     `read(run_id)` gives a run with its channels, `describe(run_id)` without; `sampled` are those that are sampled records,
     `torque_filter` [s] is the time constant of their torque channel's low-pass. `cut` gives, by run_id, the stationary test
@@ -53,7 +53,7 @@ class RunReader:
     cut: Mapping[str, Callable[[Life], StationaryRun | None]] = field(default_factory=dict)
 
     def campaign_runs(self, events: Sequence[Event], *, origin: float) -> list[CampaignRun]:
-        """The runs of a life in order, sampled records left out."""
+        """The runs of a life in order, without their sampled records."""
         return [
             without_record(replace(self.describe(event.run_id), cycles=event.cycles), origin=origin)
             if event.run_id in self.sampled
@@ -62,7 +62,7 @@ class RunReader:
         ]
 
     def stationary_tests(self, life: Life) -> Iterator[StationaryRun]:
-        """The stationary tests of a life in order, one after the other, with their records."""
+        """The stationary tests of a life in order, read one by one with their records."""
         for event in life.events:
             if event.kind != STATIONARY:
                 continue
@@ -88,8 +88,8 @@ def extension_of(content: Mapping[str, Any]) -> Extension:
 def corrected_cofs(
     extension: Extension, record: ClutchIn, life: Life, runs: Sequence[CampaignRun], tests: Iterable[StationaryRun]
 ) -> dict[str, Corrected]:
-    """run_id -> pressure [Pa] -> mean COF, its deviation, and mean COF under each draw, of the `tests` from which the
-    extension takes something.
+    """run_id -> pressure [Pa] -> corrected mean COF, its standard deviation, and mean COF under each draw, for the
+    `tests` that the extension corrects.
 
     `runs` are those of the life in order, up to the last of the tests at least.
     """
@@ -120,8 +120,8 @@ def corrected_cofs(
 def _mean_cofs(
     freed: Plateaus, law: LearnedLaw | None, cycles: float, velocities: FloatArray, geometry: Geometry
 ) -> dict[float, Value]:
-    """Mean COFs of plateaus freed of artefacts, by pressure [Pa]: of eq. 3's curves, or of the law S (1 + δ) at cycles since
-    new, whose S is fitted to torque/(1 + δ)."""
+    """Mean COFs of plateaus without artefacts, by pressure [Pa]: of eq. 3's curves, or of the law S (1 + δ) at cycles
+    since new, with S fitted to torque/(1 + δ)."""
 
     def raised(velocity: FloatArray, pressure: FloatArray) -> FloatArray:
         return (
@@ -160,9 +160,9 @@ def _mean_cof_changes(
 
 
 def _artefact(extension: Extension, run: StationaryRun, before: Campaign) -> FloatArray | None:
-    """Torque [d, n] Nm to be taken off under each draw, None where there is none.
+    """The artefact torque [d, n] Nm to subtract under each draw; None if there is none.
 
-    A test must be taken in whatever an adopted model makes of it: where it makes no number of it, nothing is taken off.
+    A test must be accepted under any adopted model, so nothing is subtracted if the model fails for it.
     """
     try:
         artefact = extension.artefact(run, before)
@@ -173,7 +173,7 @@ def _artefact(extension: Extension, run: StationaryRun, before: Campaign) -> Flo
 
 
 def model_in_force(extension: Extension | None, life: Life | None, geometry: Geometry) -> ModelInForce:
-    """What an extension changes in the tracking of a life; nothing where none is adopted or no run has begun a life."""
+    """An extension as it applies to the tracking of a life; the baseline if none is adopted or no run has begun a life."""
     if extension is None or life is None:
         return ModelInForce()
     from models.diagnosis.report.corrections import corrections  # start-up time: it loads the whole diagnosis
@@ -188,10 +188,10 @@ def model_in_force(extension: Extension | None, life: Life | None, geometry: Geo
 
 
 def added_course(extension: Extension, life: Life, geometry: Geometry) -> Course | None:
-    """Mean COF [d, m] that the effects of use add at cycles since new [m] at a pressure [Pa], 0 = the reference pressures.
+    """Mean COF [d, m] added by the effects of use at cycles since new [m] at a pressure [Pa] (0: the reference
+    pressures).
 
-    None where they add nothing at any of many cycles, where they make no number of one of them, or no test has set a
-    reference yet.
+    None if it is zero at all tried cycles, if it is not finite at some, or before the reference test.
     """
     if life.speed_range is None or not life.reference or not extension.has_course:
         return None

@@ -38,7 +38,7 @@ OF_HISTORY = LATE, OTHER_PRESSURES, OTHER_OIL_TEMPERATURE, OFF_TRACK, ODD_DATE
 
 
 def not_eq_6(courses: Sequence[CourseProbability]) -> list[Notice]:
-    """The warning of a course that eq. 6 cannot take; `courses`: the most probable first."""
+    """The warning that mean COF follows a course that eq. 6 cannot describe; `courses`: most probable first."""
     if any(share.name is CourseName.EQ_6 and share.probability >= EQ_6_DOUBTED for share in courses):
         return []
     named = [share for share in courses if share.name is not CourseName.EQ_6]
@@ -51,8 +51,8 @@ def not_eq_6(courses: Sequence[CourseProbability]) -> list[Notice]:
 
 
 def approximate(method: str, courses: Sequence[CourseProbability]) -> list[Notice]:
-    """The label of an unscented filter's answer whose most probable course, the first, is not eq. 6: its normals follow the
-    curved ridge of the other courses only roughly."""
+    """The label of an answer by an unscented filter whose most probable course, the first, is not eq. 6: its normal
+    distributions follow the curved ridges of other courses only roughly."""
     if method != UNSCENTED or courses[0].name is CourseName.EQ_6:
         return []
     named = courses[0].name.value.replace("_", " ")
@@ -64,8 +64,9 @@ def approximate(method: str, courses: Sequence[CourseProbability]) -> list[Notic
 
 
 def new_extrapolated(series: Series, late: NewLater | None, fraction: float) -> list[Notice]:
-    """The warning of a clutch that has come more than half of the way to its end before its first test, as tracked: what it
-    was when new then decides, and no test has seen it. A bench's counter that began with another clutch looks the same."""
+    """The warning of a clutch that, as tracked, had passed more than half of its way to the end before its first test:
+    the result then depends on an unmeasured initial value. A bench counter that began with another clutch looks the
+    same."""
     if late is None:
         return []
     (cycles, (first, _)), initial = series.as_measured(0), late.extrapolated
@@ -81,7 +82,7 @@ def new_extrapolated(series: Series, late: NewLater | None, fraction: float) -> 
 
 
 def missed(back_cast: BackCast) -> list[Notice]:
-    """The warning of a clutch whose earlier forecasts held too few of the tests since."""
+    """The warning of a clutch whose earlier forecast intervals held too few of the later tests."""
     if not back_cast.surprising:
         return []
     earlier, later = back_cast.widening
@@ -94,7 +95,7 @@ def missed(back_cast: BackCast) -> list[Notice]:
 
 
 def filters_disagree(answers: Mapping[str, LifePrediction]) -> list[Notice]:
-    """The warning where a filter's median lies outside another's 90 % interval, of predictions by their method."""
+    """The warning if one filter's median lies outside another's 90 % interval, from predictions by method."""
     predictions = {m: a.remaining_cycles for m, a in answers.items() if a.status not in (INSUFFICIENT, ENDED)}
     ends = [
         [math.inf if (cycles := prediction[q]) is None else cycles for q in ("0.05", "0.5", "0.95")]
@@ -108,7 +109,7 @@ def filters_disagree(answers: Mapping[str, LifePrediction]) -> list[Notice]:
 
 
 def interval_in_words(remaining: Mapping[str, float | None]) -> str:
-    """A median of remaining cycles with its 90 % interval."""
+    """The median of remaining cycles with its 90 % interval, in words."""
     low, median, high = (remaining[quantile] for quantile in ("0.05", "0.5", "0.95"))
     if median is None:
         return "an unknown number of" if low is None else f"at least {low:,.0f}"
@@ -117,7 +118,7 @@ def interval_in_words(remaining: Mapping[str, float | None]) -> str:
 
 
 def off_track(back_cast: BackCast, value: float) -> list[Notice]:
-    """The warning of a last test of this value that lies far off what the tests before it predicted."""
+    """The warning of a last test far from its prediction by the earlier tests."""
     deviations = float(back_cast.innovation[0]) if back_cast.innovation.size else 0.0
     if not abs(deviations) > FAR:
         return []
@@ -131,7 +132,7 @@ def off_track(back_cast: BackCast, value: float) -> list[Notice]:
 
 
 def new_level(cycles: Sequence[float]) -> list[Notice]:
-    """The warning of tests at these cycles since new from which on COF has a new level, and no event explains it."""
+    """The warning that COF stepped to a new level at tests at these cycles since new, with no event to explain it."""
     if not cycles:
         return []
     message = (
@@ -142,7 +143,7 @@ def new_level(cycles: Sequence[float]) -> list[Notice]:
 
 
 def late_arrival(cycles: float, latest: float) -> list[Notice]:
-    """A run that arrived after another of more cycles; `latest` are the most of those that were there."""
+    """The notice of a run that arrived after one of more cycles; `latest`: the most cycles of earlier arrivals."""
     if cycles >= latest:
         return []
     message = (
@@ -163,7 +164,7 @@ def odd_dates(life: Life) -> dict[str, list[Notice]]:
 
 
 def other_pressures_notice(reference: ByPressure, cofs: ByPressure) -> list[Notice]:
-    """A test that cannot be compared with the reference test: none of its pressures is one of that's."""
+    """The notice of a test that shares no pressure with the reference test and cannot be compared with it."""
     if not cofs or any(nearest(level, cofs) is not None for level in reference):
         return []
     measured = ", ".join(f"{bar(level):g}" for level in sorted(reference))
@@ -174,7 +175,7 @@ def other_pressures_notice(reference: ByPressure, cofs: ByPressure) -> list[Noti
 
 
 def left_out(tests: int, runs: int) -> list[Notice]:
-    """The warning of a life of so many tests of which only these `runs` can be compared with the first."""
+    """The warning of a life in which only these `runs` of its tests can be compared with the first."""
     if runs >= tests:
         return []
     verb = "does" if tests - runs == 1 else "do"
@@ -186,7 +187,7 @@ def left_out(tests: int, runs: int) -> list[Notice]:
 
 
 def other_oil_notice(life: Life, event: Event) -> list[Notice]:
-    """A test in oil that is much warmer or colder than the reference test's."""
+    """The notice of a test in oil much warmer or colder than the reference test's."""
     if not life.in_other_oil(event) or event.oil_temperature is None or life.reference_oil is None:
         return []
     oil, reference = (kelvin - ZERO_CELSIUS for kelvin in (event.oil_temperature, life.reference_oil))
@@ -200,7 +201,8 @@ def other_oil_notice(life: Life, event: Event) -> list[Notice]:
 def history_warnings(
     lives: Sequence[Life], off_track: Mapping[str, list[Warned]], *, run_id: str | None = None
 ) -> dict[str, list[Warned]]:
-    """run_id -> the warnings of every run in its history, or of one; `off_track` are those of predictions after tests."""
+    """run_id -> warnings that depend on the history, for every run or one; `off_track`: the warnings of predictions
+    after tests."""
     latest = latest_before([event for life in lives for event in life.events])
     dates = {name: notices for life in lives for name, notices in odd_dates(life).items()}
     return {
@@ -220,7 +222,7 @@ def history_warnings(
 def warned_again(
     lives: Sequence[Life], off_track: Mapping[str, list[Warned]], receipts: Mapping[str, Evaluation]
 ) -> dict[str, Evaluation]:
-    """The receipts whose warnings of the history change."""
+    """The receipts with changed warnings about the history."""
     changed = {}
     for run_id, noticed in history_warnings(lives, off_track).items():
         before = receipts[run_id].warnings

@@ -41,7 +41,7 @@ Levels = Mapping[str, Sequence[LevelFit]]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Adoption:
-    """A diagnosis whose extension was adopted, and the life that it was made of."""
+    """A diagnosis with an adopted extension, and the life it is about."""
 
     diagnosis_id: str
     life: str
@@ -49,8 +49,8 @@ class Adoption:
 
 
 def newest_adoption(adoptions: Iterable[Adoption | None], lives: Collection[str]) -> Adoption | None:
-    """The newest of what was adopted (None: the baseline), newest first: one of a life whose rebuild is none of the lives
-    any more (it was withdrawn) is passed over."""
+    """The first of `adoptions` (newest first; None: the baseline) whose life is still in the history; a life is no
+    longer in it after its rebuild was withdrawn."""
     return next(
         (adoption for adoption in adoptions if adoption is None or not adoption.life or adoption.life in lives), None
     )
@@ -58,12 +58,12 @@ def newest_adoption(adoptions: Iterable[Adoption | None], lives: Collection[str]
 
 @dataclass(frozen=True, kw_only=True)
 class ClutchHistory:
-    """What the next run's results depend on, at one revision. What follows from it is found once.
+    """The input for the results of a clutch's next run, at one revision. Derived values are computed once.
 
-    `events` are all accepted runs in the order of the history, mean COF as the model in force corrects it; `held` those that
-    are held, with the mean COFs that they would have in it; `adoptions` what was adopted, newest first (None: the baseline);
-    `priors` what fleets have taught for each severity that may come into force; `filters` the filters' states after the last
-    test, None where another release stored them; `summary` what is stored of the clutch's condition.
+    `events` are all accepted runs in the order of the history, with mean COF as corrected by the model in force; `held`
+    the held runs, with the mean COFs that they would have in it; `adoptions` the adopted models, newest first (None:
+    the baseline); `priors` the fleet priors for each severity that may come into force; `filters` the filters' states
+    after the last test, None if another release stored them; `summary` the stored summary of the clutch's condition.
     """
 
     record: ClutchIn
@@ -86,54 +86,54 @@ class ClutchHistory:
 
     @property
     def fraction(self) -> float:
-        """The share of the initial mean COF that ends a life."""
+        """The share of the initial mean COF at which a life ends."""
         return self.record.end_of_life.cof_fraction
 
     @cached_property
     def lives(self) -> tuple[timeline.Life, ...]:
-        """The history cut at its rebuilds."""
+        """The lives, separated by rebuilds."""
         return tuple(timeline.lives_of(self.events))
 
     @cached_property
     def adoption(self) -> Adoption | None:
-        """What was adopted last of the lives that are in the history."""
+        """The newest adopted model among the lives in the history."""
         return newest_adoption(self.adoptions, [life.name for life in self.lives])
 
     @cached_property
     def extension(self) -> Extension | None:
-        """The extension that the present life is tracked under, None under the baseline: a rebuild ends an adoption."""
+        """The extension for tracking the present life, None under the baseline: a rebuild ends an adoption."""
         name, adoption = self.lives[-1].name if self.events else "", self.adoption
         return adoption.extension if adoption is not None and adoption.life == name else None
 
     @property
     def kind(self) -> Kind:
-        """What clutches have in common with it that teach it and that it teaches."""
+        """The kind of clutches that share a fleet prior with this one."""
         return kind_of(self.record, self.assumptions.severity)
 
     @cached_property
     def assumptions(self) -> Assumptions:
-        """What the present life is tracked under."""
+        """The assumptions for tracking the present life."""
         return self.assumptions_under(self.extension, self.lives[-1] if self.events else None)
 
     @cached_property
     def stationary_tests(self) -> Mapping[str, str | None]:
-        """run_id of every dynamic test -> that of the stationary test that shows the clutch's state at it."""
+        """run_id of each dynamic test -> run_id of the stationary test to evaluate it against."""
         return timeline.stationary_tests_of(self.lives)
 
     def life_of(self, event: timeline.Event) -> timeline.Life:
-        """The life to which one of its events belongs, whatever became of the event since."""
+        """The life that contains the run of an event, even if the event itself was replaced since."""
         return next(life for life in self.lives if any(member.run_id == event.run_id for member in life.events))
 
     def with_event(self, event: timeline.Event) -> ClutchHistory:
-        """The clutch as it would be with one more accepted run."""
+        """The history with one more accepted run."""
         return replace(self, events=timeline.with_event(self.events, event))
 
     def __getstate__(self) -> dict[str, object]:
-        """What follows from the state is not sent to another process."""
+        """The fields alone, for pickling: derived values are not sent to other processes."""
         return {field.name: getattr(self, field.name) for field in fields(self)}
 
     def assumptions_under(self, extension: Extension | None, life: timeline.Life | None) -> Assumptions:
-        """What a life would be tracked under, were this extension in force."""
+        """The assumptions for tracking a life if this extension were in force."""
         model = model_in_force(extension, life, self.geometry)
         severity = severity_under(self.record, model.severity_exponent)
         return Assumptions(severity=severity, prior=self.priors[severity], model=model)
@@ -141,8 +141,8 @@ class ClutchHistory:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tracking:
-    """Predictions after events, the filters' states after the last, and by run_id the warnings of the predictions right
-    after tests; `again` where all that was predicted before is replaced."""
+    """Predictions after events, the filters' states after the last, and by run_id the warnings of predictions right
+    after tests; `again`: they replace all earlier predictions."""
 
     predictions: tuple[TrackPrediction, ...] = ()
     filters: States = field(default_factory=dict)
@@ -152,10 +152,10 @@ class Tracking:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Results:
-    """What is to be stored of a clutch: mean COFs by run_id beside their levels, receipts that change, corrected mean COFs
-    (in place of all where `corrected_again`), the tracking and the summary (None: it stays); `details`, which stand beside a
-    run's channels, of runs that were analysed again; what changes in the doubts about other runs; and, where it changes what
-    an ended life teaches, the kind of clutches that it `teaches`."""
+    """The results to be stored of a clutch: fitted levels with mean COFs by run_id; changed receipts; corrected mean
+    COFs (replacing all if `corrected_again`); tracking and summary (None: unchanged); `details`, stored with the
+    channels, of runs analysed again; changed doubts about other runs; and the kind of clutches that it `teaches`, if
+    the lessons of an ended life change."""
 
     levels: Levels = field(default_factory=dict)
     cofs: Mapping[str, timeline.ByPressure] = field(default_factory=dict)
@@ -177,10 +177,11 @@ def computed_again(
     *,
     evaluated: Mapping[str, str | None],
 ) -> tuple[ClutchHistory, Results]:
-    """Mean COFs over the protocol of each life, freed of the artefacts of the model in force, and all tracked again.
+    """All results of a clutch recomputed from its fits: mean COFs over the protocol of each life, corrected by the
+    model in force, and tracks.
 
-    `levels` and `receipts` are those of all runs; `evaluated` as `loops_again` takes it. Returns the state with its mean
-    COFs, and what is to be stored.
+    `levels` and `receipts` are those of all runs; `evaluated` as in `loops_again`. Returns the history with its mean
+    COFs, and the results to be stored.
     """
     final, cofs, corrected = with_cofs(state, levels, reader)
     fresh = {
@@ -203,8 +204,8 @@ def computed_again(
 def with_cofs(
     state: ClutchHistory, levels: Levels, reader: RunReader
 ) -> tuple[ClutchHistory, dict[str, timeline.ByPressure], dict[str, timeline.Corrected]]:
-    """The state with the mean COFs of its events and the new levels that these show, the COFs that the fits give by run_id,
-    and those that the model in force corrects; arguments as of `computed_again`."""
+    """The history with the mean COFs of its events and their new levels; the mean COFs of the fits by run_id; and those
+    corrected by the model in force. Arguments as in `computed_again`."""
     cofs = _cofs_of_tests(state.lives, levels, state.geometry)
     events = tuple(replace(event, cofs=cofs.get(event.run_id, {}), under={}) for event in state.events)
     plain = replace(state, events=events)
@@ -219,8 +220,8 @@ def with_cofs(
 
 
 def cofs_among(state: ClutchHistory, event: timeline.Event, levels: Sequence[LevelFit]) -> timeline.ByPressure:
-    """A run's mean COFs as they are, or would be, in the history: over the protocol of its life's first stationary test,
-    which may be itself."""
+    """A run's mean COFs as part of the history: over the protocol of its life's first stationary test, which may be the
+    run itself."""
     life = state.with_event(event).life_of(event)
     return _cofs_of_tests([life], {event.run_id: levels}, state.geometry).get(event.run_id, {})
 
@@ -233,8 +234,8 @@ def with_set_aside(
     receipts: Mapping[str, Evaluation],
     reader: RunReader,
 ) -> Results:
-    """The results with those of runs that are none of the history: their mean COFs and loops as they would be among it, and
-    receipts without the warnings of the history."""
+    """The results with those of held and withdrawn runs added: their mean COFs and loops as if they were in the
+    history, and receipts without warnings about the history."""
     cofs, fresh, own_levels = {**computed.cofs}, {**computed.receipts}, {**computed.levels}
     for event in events:
         name, fits = event.run_id, levels.get(event.run_id, ())
@@ -251,7 +252,7 @@ def with_set_aside(
 def _cofs_of_tests(
     lives: Sequence[timeline.Life], levels: Levels, geometry: Geometry
 ) -> dict[str, timeline.ByPressure]:
-    """Mean COF of every test that has curves, over the protocol of its life's first test."""
+    """Mean COF of every test with curves, over the protocol of its life's first test."""
     cofs: dict[str, timeline.ByPressure] = {}
     for life in lives:
         velocities = None if life.speed_range is None else timeline.reference_velocities(life.speed_range, geometry)
@@ -265,7 +266,7 @@ def _cofs_of_tests(
 def corrected_newest(
     state: ClutchHistory, newest: timeline.Event, test: StationaryRun | None, reader: RunReader
 ) -> timeline.Corrected | None:
-    """The mean COFs of the test that comes last, freed of artefacts of the model in force; None where nothing changes."""
+    """The mean COFs of the last test, corrected by the model in force; None if it corrects nothing."""
     if state.extension is None or newest.speed_range is None or test is None:
         return None
     life = state.lives[-1]
@@ -275,7 +276,8 @@ def corrected_newest(
 
 @tracer.start_as_current_span("track")
 def track(state: ClutchHistory, *, newest: timeline.Event | None = None) -> Tracking:
-    """Track what the history asks for: one step where `newest` comes last and the filters' states serve, else all of it."""
+    """Track the history: by one step if `newest` comes last and the filters' stored states can be carried on, else all
+    lives again."""
     if not state.events:
         return Tracking()
     assumptions, lives = state.assumptions, state.lives
@@ -304,7 +306,8 @@ def track(state: ClutchHistory, *, newest: timeline.Event | None = None) -> Trac
 def _carried(
     state: ClutchHistory, life: timeline.Life, whole: timeline.Series, newest: timeline.Event
 ) -> States | None:
-    """The stored states from before `newest`, or None where one step on from them would not give the same answer."""
+    """The stored filter states from before `newest`; None if a step from them would not give the same result as
+    tracking again."""
     last = life.events[-1]
     is_test = newest.speed_range is not None
     index = (
@@ -325,8 +328,8 @@ def _carried(
 def loops_again(
     state: ClutchHistory, levels: Levels, reader: RunReader, evaluated: Mapping[str, str | None]
 ) -> dict[str, list[Loop]]:
-    """run_id -> loops of the dynamic tests that have another stationary test than that which they were `evaluated` against,
-    by run_id; of those that are not there, too."""
+    """run_id -> friction loops, for dynamic tests whose stationary test is no longer the one in `evaluated` (by
+    run_id), or which are not in it."""
     loops = {}
     for run_id, test in state.stationary_tests.items():
         if run_id not in evaluated or evaluated[run_id] != test:
@@ -339,8 +342,8 @@ def loops_again(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Arrival:
-    """A run by itself: as it came in, whether it is a sampled record, its own results, what its rows show of friction and
-    what is odd about them, and when it was received."""
+    """An arriving run: as sent, whether it is a sampled record, its own results, the friction its rows show, the doubts
+    they raise, and its time of receipt."""
 
     run: IncomingRun
     sampled: bool
@@ -351,14 +354,14 @@ class Arrival:
 
     @property
     def kept(self) -> dict[str, object]:
-        """What is kept beside its channels."""
+        """The details stored with the run's channels."""
         return self.analysis.details_to_store(self.run) | (
             {} if self.shown is None else {"shown": self.shown.to_list()}
         )
 
 
 def test_of(arrival: Arrival, life: timeline.Life) -> StationaryRun | None:
-    """The run as a stationary test of a life, by the plateaus that were cut already."""
+    """The run as a stationary test of a life, from the plateaus found already."""
     plateaus, times = arrival.analysis.plateaus, arrival.analysis.times
     if plateaus is None:
         return None
@@ -366,7 +369,7 @@ def test_of(arrival: Arrival, life: timeline.Life) -> StationaryRun | None:
 
 
 def reader_with(stored: RunReader, arrival: Arrival) -> RunReader:
-    """The stored runs, and the one that comes in."""
+    """A reader of the stored runs and the arriving one."""
     name = arrival.run.run_id
     return replace(
         stored,

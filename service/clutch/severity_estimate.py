@@ -24,7 +24,7 @@ _GRID = Grid()
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SeverityPosterior:
-    """The probability [k] of each of SEVERITY_EXPONENTS, of the work that `basis` names."""
+    """The posterior probability [k] of each of SEVERITY_EXPONENTS, for the work named by `basis`."""
 
     basis: SeverityBasis
     probability: FloatArray
@@ -42,7 +42,7 @@ class SeverityPosterior:
         return SEVERITY_EXPONENTS[int(self.probability.argmax())]
 
     def doubts(self, counted: Severity) -> list[Notice]:
-        """A warning where the exponent that ζ counts by, 0 where it counts cycles, is improbable beside the others."""
+        """A warning if the exponent counted by ζ (0 if it counts cycles) is improbable compared with the others."""
         in_force = 0.0 if counted.basis is SeverityBasis.CYCLES else counted.exponent
         if in_force not in SEVERITY_EXPONENTS:
             return []
@@ -58,10 +58,10 @@ class SeverityPosterior:
 
 
 def severity_estimate(life: Life, assumptions: Assumptions) -> SeverityPosterior | None:
-    """The estimate of a life, under the assumptions that it is tracked under but for their severity.
+    """The posterior of a life's severity exponent, under its assumptions of tracking except the severity.
 
-    None where its duty states no work or hardly varies, or where it has too few tests: then nothing tells the exponents
-    apart. The work is what the record counts, dissipated energy where that counts cycles.
+    None if its duty states no work or hardly varies, or if it has too few tests, because then the data cannot
+    distinguish exponents. The work is the one counted by the record, or dissipated energy if that counts cycles.
     """
     basis = assumptions.severity.basis
     if basis is SeverityBasis.CYCLES:

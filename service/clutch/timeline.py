@@ -46,8 +46,8 @@ _MOMENTS = tuple(moment.replace(tzinfo=UTC).timestamp() for moment in (datetime.
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Shown:
-    """What the rows of a run show of friction: mean COF over the speeds [-], of either sign, the highest pressure [Pa] and
-    speed [rad/s], the median of the oil's temperature [K]; of an open clutch the median torque [Nm]. None: not shown."""
+    """Friction shown by a run's rows: mean COF over the speeds [-], of either sign, highest pressure [Pa] and speed
+    [rad/s], median oil temperature [K]; for an open clutch the median torque [Nm]. None: not shown."""
 
     cof: float | None = None
     pressure: float | None = None
@@ -61,7 +61,7 @@ class Shown:
 
     @classmethod
     def from_list(cls, numbers: Sequence[float | None]) -> "Shown":
-        """The inverse."""
+        """The inverse of `to_list`."""
         return cls(**{field.name: number for field, number in zip(fields(cls), numbers, strict=True)})
 
 
@@ -103,7 +103,7 @@ class Event:
     def measured(
         self, progress: float, value: float, sd: float, epoch: int, new_levels: int, sensor: int
     ) -> Measurement:
-        """A measurement of mean COF over the pressures with these numbers, kept for the last ones."""
+        """A measurement of mean COF over the pressures with these numbers; the last few are cached."""
         numbers = (progress, value, sd, epoch, new_levels, sensor)
         if not self._measured or self._measured[0] != numbers:
             measurement = Measurement(
@@ -119,27 +119,27 @@ class Event:
         return made
 
     def pooled(self, reference: ByPressure) -> Value | None:
-        """`pooled_value` of its mean COFs, kept for the last reference."""
+        """`pooled_value` of the event's mean COFs, cached for the last reference."""
         if not self._pooled or self._pooled[0] is not reference:
             self._pooled[:] = [reference, pooled_value(reference, self.cofs)]
         value: Value | None = self._pooled[1]
         return value
 
     def corrected(self, cofs: Corrected | None) -> "Event":
-        """The event with the mean COF that the model in force corrects; unchanged if that corrects nothing."""
+        """The event with mean COF as corrected by the model in force; unchanged if there is no correction."""
         if cofs is None:
             return self
         means = {level: (mean, sd) for level, (mean, sd, _) in cofs.items()}
         return replace(self, cofs=means, under={level: draws for level, (_, _, draws) in cofs.items() if draws})
 
     def cofs_under(self, draw: int) -> ByPressure:
-        """Mean COF and its deviation by pressure [Pa] under one draw."""
+        """Mean COF with its standard deviation by pressure [Pa], under one draw of the model in force."""
         if not self.under:
             return self.cofs
         return {level: (self.under[level][draw], sd) for level, (_, sd) in self.cofs.items()}
 
     def at(self, cycles: float) -> "Event":
-        """The event at other cycles since new."""
+        """The event moved to other cycles since new."""
         return replace(self, cycles=cycles, duty=None if self.duty is None else replace(self.duty, end=cycles))
 
 
@@ -166,19 +166,21 @@ class Series:
 
     @property
     def weighted(self) -> tuple[tuple[float, tuple[Measurement, ...]], ...]:
-        """The draws, or all of the weight on what was measured."""
+        """The measurements under each draw, with the draw's weight; without draws, the plain measurements with weight
+        1."""
         return self.draws or ((1.0, self.measurements),)
 
     def until(self, event: int) -> int:
-        """How many measurements there were when `event` had happened."""
+        """The number of measurements up to and including `event`."""
         return sum(1 for index in self.events if index <= event)
 
     def priors(self, first: Measurement) -> Mapping[str, TrackPrior]:
-        """The priors that it is tracked under where `first` is its first measurement, by name."""
+        """The priors for tracking the series by name, given its `first` measurement."""
         return self.assumptions.priors(self.quantity, first, self.scale)
 
     def as_measured(self, index: int) -> tuple[float, Value]:
-        """Cycles since new, and value with deviation, of a measurement; the course of the model in force is put back on."""
+        """A measurement as cycles since new, value and standard deviation; the course of the model in force is added
+        back."""
         measurement = self.measurements[index]
         cycles = float(self.scale.cycles(measurement.progress))
         added = float(self.assumptions.offset(self.quantity, self.pressure, np.array([cycles]))[0])
@@ -187,7 +189,7 @@ class Series:
 
 @dataclass(frozen=True, kw_only=True)
 class Life:
-    """One life of a clutch: its events by cycles, and the cycles at which it began. What follows from them is found once."""
+    """One life of a clutch: its events by cycles, and the cycles at which it began. Derived values are computed once."""
 
     origin: float
     events: tuple[Event, ...]
@@ -199,7 +201,7 @@ class Life:
 
     @cached_property
     def end(self) -> Event | None:
-        """The event by which it was declared ended; None while it goes on."""
+        """The event that declares the life ended; None while it goes on."""
         return next((event for event in self.events if event.end is not None), None)
 
     @cached_property
@@ -214,16 +216,16 @@ class Life:
 
     @cached_property
     def reference_oil(self) -> float | None:
-        """Mean oil temperature [K] of that test; None where it was not measured."""
+        """Mean oil temperature [K] of the reference test; None if it was not measured."""
         return next((event.oil_temperature for event in self.events if event.cofs), None)
 
     @cached_property
     def tests(self) -> int:
-        """How many of its tests have a mean COF, those among them that cannot be compared with the first."""
+        """The number of tests with a mean COF, including those not comparable with the first."""
         return sum(bool(event.cofs) for event in self.events)
 
     def in_other_oil(self, event: Event) -> bool:
-        """Whether a test was made at another oil temperature than the reference test: it cannot be compared with it."""
+        """Whether a test's oil temperature differs too much from the reference test's for a comparison."""
         reference = self.reference_oil
         if reference is None or event.oil_temperature is None:
             return False
@@ -231,7 +233,7 @@ class Life:
 
     @property
     def oil_question(self) -> str | None:
-        """What the last test says of its oil, as a clause, where its temperature moved so far within it that its curves mix
+        """A clause on the oil of the last test, where its temperature moved so far within it that its curves mix
         temperatures."""
         last = next((event for event in reversed(self.events) if event.speed_range is not None), None)
         low, high = (last and last.oil_range) or (0.0, 0.0)
@@ -241,8 +243,9 @@ class Life:
         return f"{went} within the test at {last.cycles:,.0f} cycles"
 
     def rig_question(self, new_levels: Sequence[float]) -> str | None:
-        """What a change of the rig would explain as well as one of the clutch, as a clause: a step that no event explains,
-        at the cycles `new_levels`, or mean COFs whose ratios between pressures are not those of the reference test."""
+        """A clause naming a change that the rig would explain as well as the clutch; None if there is none. It is a
+        step at the cycles `new_levels` that no event explains, or mean COFs whose ratios between pressures differ from
+        those of the reference test."""
         if new_levels:
             return f"mean COF stepped at {new_levels[-1]:,.0f} cycles and no maintenance was sent"
         last = next((event.cofs for event in reversed(self.events) if event.cofs), {})
@@ -254,7 +257,7 @@ class Life:
         return f"mean COF at {high:g} bar has risen against that at {low:g} bar"
 
     def _unexplained(self, tests: Sequence[Event]) -> Iterator[float]:
-        """The cycles of those tests that begin a new level while no event lies between them and the test before."""
+        """The cycles of tests that begin a new level with no event between them and the previous test."""
         shifts = [event.cycles for event in self.events if event.shift]
         for at in (test.cycles for test in tests if test.new_level):
             before = max((test.cycles for test in tests if test.cycles < at), default=0.0)
@@ -262,26 +265,26 @@ class Life:
                 yield at
 
     def until(self, event: int) -> "Life":
-        """The life as it was when `event` had happened."""
+        """The life up to and including `event`."""
         return Life(origin=self.origin, events=self.events[: event + 1])
 
     def with_cofs(self, cofs: Mapping[str, ByPressure]) -> "Life":
-        """The life by other mean COFs of its tests, by run_id; none for a test that is not among them."""
+        """The life with its tests' mean COFs replaced, by run_id; a test not among them has none."""
         return replace(
             self, events=tuple(replace(event, cofs=cofs.get(event.run_id, {}), under={}) for event in self.events)
         )
 
     def corrected(self, cofs: Mapping[str, Corrected]) -> "Life":
-        """The life with mean COFs as a model corrects them, by run_id; the others stay."""
+        """The life with mean COFs as corrected by a model, by run_id; other tests are unchanged."""
         return replace(self, events=tuple(event.corrected(cofs.get(event.run_id)) for event in self.events))
 
     def scale(self, assumptions: Assumptions) -> Scale:
-        """ζ over cycles since new, by the duty of this life."""
+        """The scale between cycles since new and ζ, from the duty of this life."""
         return assumptions.scale(self.origin, [event.duty for event in self.events if event.duty is not None])
 
     @cached_property
     def _pooled(self) -> list[Series]:
-        """Where `pooled` keeps what it has found last."""
+        """The cache of `pooled`: its last result."""
         return []
 
     def pooled(self, assumptions: Assumptions) -> Series:
@@ -303,7 +306,8 @@ class Life:
         value: Callable[[ByPressure, ByPressure], Value | None],
         value_of: Callable[[Event, ByPressure], Value | None],
     ) -> Series:
-        """Mean COF by its value of the reference test's and a test's mean COFs, under each draw of the model in force."""
+        """The series of mean COF computed by `value` from the reference test's and a test's mean COFs, under each draw
+        of the model in force."""
         first = next((event for event in self.events if event.cofs), None)
         reference = {} if first is None else first.cofs
         values = [value_of(event, reference) for event in self.events]
@@ -329,9 +333,9 @@ class Life:
     def series(
         self, assumptions: Assumptions, quantity: str, pressure: float, values: Sequence[Value | None]
     ) -> Series:
-        """The series of a quantity from its value at every event, None where it has none.
+        """The series of a quantity from its value at every event (None: no value).
 
-        Tests in oil of another temperature are no part of it, unless the model in force corrects for that.
+        Tests in oil of another temperature are left out, unless the model in force corrects for it.
         """
         corrected = assumptions.corrects_oil(quantity)
         measured = [
@@ -370,9 +374,9 @@ class Life:
 
 
 def order(events: Sequence[Event]) -> tuple[Event, ...]:
-    """Events sorted by cycles, and at equal cycles by when they were made: the order of arrival does not matter.
+    """Events sorted by cycles, and at equal cycles by the time they were made, irrespective of the order of arrival.
 
-    Where the rig did not say when, a run is no earlier than those that had arrived before it, whatever the clock said then.
+    A run without a stated time counts as no earlier than the runs that arrived before it.
     """
     arrived = sorted((event for event in events if not event.dated), key=lambda event: event.arrived)
     moments = itertools.accumulate((event.moment for event in arrived), max)
@@ -383,21 +387,21 @@ def order(events: Sequence[Event]) -> tuple[Event, ...]:
 
 
 def with_event(events: tuple[Event, ...], event: Event) -> tuple[Event, ...]:
-    """An ordered history with one more event, ordered."""
+    """The history with one more event, in order."""
     if not events or event.cycles > events[-1].cycles:  # behind all others, whatever is known of dates
         return (*events, event)
     return order([*events, event])
 
 
 def lives_of(events: Sequence[Event]) -> list[Life]:
-    """Cut an ordered history into lives at its rebuilds."""
+    """The lives of an ordered history, separated by its rebuilds."""
     starts = [index for index, event in enumerate(events) if event.rebuild and index > 0]
     parts = [tuple(events[a:b]) for a, b in itertools.pairwise([0, *starts, len(events)]) if b > a]
     return [Life(origin=part[0].cycles if part[0].rebuild else 0.0, events=part) for part in parts]
 
 
 class MaintenanceFields(TypedDict):
-    """What maintenance is in the history."""
+    """The fields of an event that describe maintenance."""
 
     rebuild: bool
     shift: bool
@@ -406,7 +410,7 @@ class MaintenanceFields(TypedDict):
 
 
 def maintenance_fields(event: str | None, reason: str | None) -> MaintenanceFields:
-    """What maintenance of that kind is in the history; of a run that is none, nothing."""
+    """The fields of an event for maintenance of that kind; all false or None for other runs."""
     return {
         "rebuild": event == REBUILD,
         "shift": event not in (None, REBUILD, END_OF_LIFE),
@@ -416,7 +420,7 @@ def maintenance_fields(event: str | None, reason: str | None) -> MaintenanceFiel
 
 
 def lives_until(lives: Sequence[Life], cycles: float | None) -> Sequence[Life]:
-    """Lives as they were at so many cycles since new, None: as they are."""
+    """The lives as of this many cycles since new; None: in full."""
     if cycles is None:
         return lives
     happened = ((life, tuple(event for event in life.events if event.cycles <= cycles)) for life in lives)
@@ -424,7 +428,7 @@ def lives_until(lives: Sequence[Life], cycles: float | None) -> Sequence[Life]:
 
 
 def require_within_ends(lives: Sequence[Life]) -> None:
-    """Raise LifeEndedError where one of the lives of a clutch has duty or tests after its declared end, or two ends."""
+    """Raise LifeEndedError if a life has duty, tests or a second end after its declared end."""
     beyond = beyond_end(lives)
     if beyond is not None:
         end, event = beyond
@@ -436,7 +440,8 @@ def require_within_ends(lives: Sequence[Life]) -> None:
 
 
 def beyond_end(lives: Sequence[Life]) -> tuple[Event, Event] | None:
-    """A declared end of one of the lives, and duty or a test after it in that life, or a second end; None without any."""
+    """The first declared end of a life that is followed by duty, a test or a second end, with that event; None if there
+    is none."""
     for life in lives:
         end = life.end
         if end is None:
@@ -449,8 +454,8 @@ def beyond_end(lives: Sequence[Life]) -> tuple[Event, Event] | None:
 
 
 def stationary_tests_of(lives: Sequence[Life]) -> dict[str, str | None]:
-    """run_id of every dynamic test -> that of the stationary test that shows the clutch's state at it: the last one of its
-    life up to its cycles, else the next; None where there is none."""
+    """run_id of each dynamic test -> run_id of the stationary test that shows the clutch's state then: the last of its
+    life up to its cycles, else the next; None if there is none."""
     names: dict[str, str | None] = {}
     for life in lives:
         tests = [event for event in life.events if event.speed_range is not None]
@@ -463,7 +468,7 @@ def stationary_tests_of(lives: Sequence[Life]) -> dict[str, str | None]:
 
 
 def latest_before(events: Sequence[Event]) -> dict[str, float]:
-    """run_id -> the most cycles of all runs that had arrived before it, 0 for the first."""
+    """run_id -> the most cycles of all runs that arrived before it, 0 for the first."""
     latest, most = {}, 0.0
     for event in sorted(events, key=lambda event: event.arrived):
         latest[event.run_id] = most
@@ -477,7 +482,7 @@ def reference_velocities(speed_range: Value, geometry: Geometry) -> FloatArray:
 
 
 def nearest(level: float, values: ByPressure) -> Value | None:
-    """The value at the pressure that is the same level as `level`, if there is one."""
+    """The value at the pressure of the same level as `level`; None if there is none."""
     if level in values or not values:
         return values.get(level)
     near = min(values, key=lambda pressure: abs(pressure - level))
@@ -485,7 +490,7 @@ def nearest(level: float, values: ByPressure) -> Value | None:
 
 
 def nearest_pressure(level: float, pressures: Sequence[float]) -> float | None:
-    """The pressure [Pa] that is the same level as `level`, if there is one."""
+    """The pressure [Pa] of the same level as `level`; None if there is none."""
     near = nearest(level, {pressure: (pressure, 0.0) for pressure in pressures})
     return None if near is None else near[0]
 
@@ -493,7 +498,7 @@ def nearest_pressure(level: float, pressures: Sequence[float]) -> float | None:
 def duty_block(
     end: float, cycles: float | None, energy_kj: float | None, speed_rpm: float | None, duration_s: float | None
 ) -> Block | None:
-    """A block of duty in SI units, None where a run is none."""
+    """The block of duty of a run in SI units; None if the run is no duty."""
     if cycles is None:
         return None
     return Block(
@@ -506,8 +511,8 @@ def duty_block(
 
 
 def moment_of(started_at: str | None, received_at: str) -> tuple[float, bool]:
-    """When a run was made [s since 1970], and whether the rig said so: when it was started, or received where the rig
-    did not say or said what cannot be."""
+    """The time of a run [s since 1970], and whether the rig stated it: the start, or the receipt if the rig stated none
+    or an impossible one."""
     received = datetime.fromisoformat(received_at).timestamp()
     if started_at is None or not is_possible(started_at, received_at):
         return received, False
@@ -515,8 +520,8 @@ def moment_of(started_at: str | None, received_at: str) -> tuple[float, bool]:
 
 
 def is_possible(started_at: str, received_at: str) -> bool:
-    """Whether a run that was received then can have been started then: not before EARLIEST, nor more than CLOCKS_APART after
-    it was received."""
+    """Whether a start time is possible for a run received then: not before EARLIEST, and at most CLOCKS_APART after the
+    receipt."""
     started, received = (datetime.fromisoformat(each) for each in (started_at, received_at))
     return started.timestamp() >= EARLIEST and started.timestamp() <= received.timestamp() + CLOCKS_APART
 
@@ -546,13 +551,13 @@ def moment_at(events: Sequence[Event], pace: float, cycles: float) -> float:
 
 
 def date_of(moment: float) -> str | None:
-    """A moment [s since 1970] as text, UTC, ISO 8601; None outside of the years 1 to 9999."""
+    """A time [s since 1970] as ISO 8601 text in UTC; None outside of the years 1 to 9999."""
     earliest, latest = _MOMENTS
     return datetime.fromtimestamp(moment, UTC).isoformat(timespec="seconds") if earliest < moment < latest else None
 
 
 def pooled_value(reference: ByPressure, values: ByPressure) -> Value | None:
-    """Mean over the reference pressures; for a pressure that is missing the rest stands, scaled as in the reference."""
+    """The mean over the reference pressures; a missing pressure is replaced by the others, scaled as in the reference."""
     if values.keys() == reference.keys():
         matched, scale = values, 1.0
     else:

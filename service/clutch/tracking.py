@@ -57,7 +57,7 @@ _FLAGS = "outlying"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrackPrediction:
-    """The prediction at `cycles` by one method, in the public shape."""
+    """The prediction at `cycles` by one method, as sent to clients."""
 
     cycles: float
     method: str
@@ -66,9 +66,8 @@ class TrackPrediction:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tracked:
-    """A filter's states after `runs` measurements of a series, by the name of the prior that they started from; what its
-    forecasts along the way said about the tests since; and the samples that were drawn of them, by method: they are not
-    stored.
+    """A filter's states after `runs` measurements of a series, by the name of the prior that they started from; scores of
+    its forecasts along the way; and the samples that were drawn of them, by method, which are not stored.
     """
 
     runs: int
@@ -77,7 +76,7 @@ class Tracked:
     samples: Mapping[str, TrackPosterior] = field(default_factory=dict)
 
     def to_arrays(self) -> dict[str, FloatArray | NDArray[np.bool_]]:
-        """Named arrays: those of a state after the prior that it started from, as in `weak/mean`."""
+        """Named arrays: each array of a state after the name of its prior, as `weak/mean`."""
         named = {
             f"{prior}/{name}": array
             for prior, state in self.states.items()
@@ -175,7 +174,7 @@ def advance(
 
 
 def _branches(series: Series) -> dict[str, tuple[TrackPrior, tuple[Measurement, ...]]]:
-    """What a filter is run under, by name: every prior, with every draw of the series' measurements."""
+    """The combinations that a filter runs under, by name: every prior with every draw of the series' measurements."""
     return {
         _branch(prior_name, draw, series): (prior, measurements)
         for draw, (_, measurements) in enumerate(series.weighted)
@@ -184,7 +183,7 @@ def _branches(series: Series) -> dict[str, tuple[TrackPrior, tuple[Measurement, 
 
 
 def _branch(prior: str, draw: int, series: Series) -> str:
-    """The name of a state: that of its prior, and of the draw where there are several."""
+    """The name of a state: the prior's, with the draw's number if there are several draws."""
     return f"{prior}@{draw}" if series.draws else prior
 
 
@@ -196,7 +195,7 @@ def _carried(branches: int) -> Ukf:
 
 
 def _continues(tracked: Tracked, branches: Mapping[str, tuple[TrackPrior, tuple[Measurement, ...]]]) -> bool:
-    """Whether the states are those of the branches' first measurements under their priors."""
+    """Whether the states were made from the branches' first measurements under the branches' priors."""
     if tracked.states.keys() != branches.keys():
         return False
     for name, state in tracked.states.items():
@@ -211,9 +210,9 @@ def _continues(tracked: Tracked, branches: Mapping[str, tuple[TrackPrior, tuple[
 
 
 def drawn(method: str, series: Series, tracked: Tracked) -> TrackPosterior:
-    """A weighted sample of the coefficients after `tracked.runs` measurements; the same each time, and drawn once.
+    """A weighted sample of the coefficients after `tracked.runs` measurements; reproducible, and drawn once.
 
-    Its size is shared among the priors and the draws of the model in force: so a prediction costs about the same.
+    Priors and draws of the model in force share its size, so that every prediction costs about the same.
     """
     if method in tracked.samples:
         return tracked.samples[method]
@@ -240,7 +239,7 @@ def _purpose(method: str, prior: str) -> str:
 
 
 def step_rng(purpose: str, series: Series, step: int) -> np.random.Generator:
-    """The random numbers of one step: they depend on purpose, series and step alone, not on the clutch's name."""
+    """The random generator of one step; it depends on purpose, series and step alone, not on the clutch's name."""
     name = f"{purpose}/{series.quantity}/{series.pressure!r}"
     return np.random.default_rng([zlib.crc32(name.encode()), step])
 
@@ -248,9 +247,9 @@ def step_rng(purpose: str, series: Series, step: int) -> np.random.Generator:
 def predict(
     method: str, series: Series, tracked: Tracked | None, cycles: float, fraction: float, *, tests: int
 ) -> LifePrediction:
-    """The prediction at `cycles` of a series; the life has so many `tests`.
+    """The prediction of a series at `cycles`, for a life with this many `tests`.
 
-    With too few of them only the last and the safe bound are stated.
+    With too few tests it has only the last value and the safe bound.
     """
     answer = items.insufficient(series.assumptions, cycles, series.pressure, fraction)
     if tracked is None:
@@ -323,7 +322,7 @@ def predict(
 
 
 def _innovation(method: str, series: Series, tracked: Tracked) -> list[float]:
-    """The innovation of the next test, the least of those under the draws of the model in force; [] where there is none."""
+    """The innovation of the next test, the smallest under any draw of the model in force; [] if it is not known."""
     runs = tracked.runs
     if runs < FEWEST_BEFORE:
         return []
@@ -338,7 +337,7 @@ def _innovation(method: str, series: Series, tracked: Tracked) -> list[float]:
 def end_of_life(
     sample: TrackPosterior, series: Series, tracked: Tracked, cycles: float, fraction: float, horizon: float
 ) -> StatedEnd:
-    """The end of life ζ as it is stated at `cycles`, up to a horizon in ζ."""
+    """The end of life in ζ as predicted at `cycles`, up to a horizon in ζ."""
     as_of = float(series.scale.progress(cycles))
     return stated_end(
         sample,
@@ -354,14 +353,14 @@ def end_of_life(
 
 
 def offset_of(series: Series) -> Offset | None:
-    """The course of the model in force over ζ, None where there is none."""
+    """The course of the model in force as a function of ζ; None if there is none."""
     if series.assumptions.model.course is None:
         return None
     return lambda progress: series.assumptions.offsets(series.quantity, series.pressure, series.scale.cycles(progress))
 
 
 def mean_offset_of(series: Series) -> Offset | None:
-    """The mean of that over the model's draws [1, k]."""
+    """The mean of that course over the model's draws [1, k]."""
     quantity, pressure, assumptions = series.quantity, series.pressure, series.assumptions
     if assumptions.model.course is None:
         return None
@@ -379,11 +378,10 @@ def predict_at(
     back_cast: BackCast | None = None,
     carried: Tracked | None = None,
 ) -> LifePrediction:
-    """The prediction for the last of the lives at one pressure of its reference test, or over all, as it would have been
-    made at `at_cycles`.
+    """The prediction for the last life as of `at_cycles`, at one pressure of its reference test or over all.
 
-    A `back_cast` that is known is not made again: of the exact filter it takes most of the time. A filter that was `carried`
-    through the first measurements goes on. Raises NotFoundError where the reference test did not measure that pressure.
+    A known `back_cast` is reused: for the exact filter it takes most of the time. A filter `carried` through the first
+    measurements is carried on. Raises NotFoundError if the reference test did not measure that pressure.
     """
     level = ALL_PRESSURES if pressure_bar is None else _level(lives[-1] if lives else None, pressure_bar)
     happened = lives_until(lives, at_cycles)

@@ -24,7 +24,7 @@ from service.errors import NotFoundError
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClutchMeasurements:
-    """What was measured of a clutch by run_id, of its held runs too."""
+    """The stored measurements of a clutch by run_id, including its held runs."""
 
     levels: Levels
     receipts: Mapping[str, Evaluation]
@@ -33,12 +33,12 @@ class ClutchMeasurements:
 
 
 def needs_evidence(state: ClutchHistory) -> bool:
-    """Whether a clutch's summary follows from more than its tracks."""
+    """Whether a clutch's summary needs more than its tracks."""
     return bool(state.held or state.record.end_of_life.criteria)
 
 
 def summarised(state: ClutchHistory, tracking: Tracking, evidence: ClutchMeasurements | None) -> Mapping[str, Any]:
-    """The summary of a clutch that was tracked; `evidence` is needed where `needs_evidence` says so."""
+    """The summary of a tracked clutch; `evidence` is required if `needs_evidence`."""
     if not state.events:
         return held_summary(state, {}, evidence)
     last, life = state.events[-1].cycles, state.lives[-1]
@@ -64,7 +64,7 @@ def summarised(state: ClutchHistory, tracking: Tracking, evidence: ClutchMeasure
 
 
 def held_summary(state: ClutchHistory, filters: States, evidence: ClutchMeasurements | None) -> Mapping[str, Any]:
-    """What a summary says of the held runs: how many there are, and by each filter what would be predicted with them."""
+    """The held runs in a clutch's summary: their number, and the prediction by each filter with them counted."""
     if not state.held or evidence is None:
         return {"held": len(state.held), "with_held": None}
     state_with_held = with_held(state, evidence)
@@ -75,7 +75,7 @@ def held_summary(state: ClutchHistory, filters: States, evidence: ClutchMeasurem
 
 
 def with_held(state: ClutchHistory, evidence: ClutchMeasurements) -> ClutchHistory:
-    """The clutch as it would be were its held runs accepted."""
+    """The clutch's history with its held runs accepted."""
     state_with_held = replace(state, events=order([*state.events, *state.held]), held=())
     if evidence.reader is None:
         raise ValueError("a history with held runs needs a reader of them")
@@ -83,7 +83,8 @@ def with_held(state: ClutchHistory, evidence: ClutchMeasurements) -> ClutchHisto
 
 
 def outlook(state: ClutchHistory, method: str, evidence: ClutchMeasurements, filters: States) -> Mapping[str, Any]:
-    """The remaining life by a filter and the clutch's own criteria; `filters` of other measurements are not carried on."""
+    """The remaining life by a filter and the clutch's own criteria; `filters` are carried on only if they are of the
+    same measurements."""
     prediction = predict_at(
         state.lives, state.assumptions, state.fraction, method=method, carried=filters.get(carrier(method))
     )
@@ -94,7 +95,7 @@ def outlook(state: ClutchHistory, method: str, evidence: ClutchMeasurements, fil
 def by_own_criteria(
     state: ClutchHistory, method: str, prediction: LifePrediction, evidence: ClutchMeasurements, filters: States
 ) -> LifePrediction:
-    """A prediction by mean COF as the criteria of the record change it; unchanged if only mean COF ends its life."""
+    """A prediction by mean COF, changed by the record's other criteria; unchanged if mean COF alone ends the life."""
     criteria = state.record.end_of_life.criteria
     measured = measured_life(state, chosen_life(state), evidence, filters) if criteria else None
     if measured is None:
@@ -111,7 +112,7 @@ def by_own_criteria(
 def measured_life(
     state: ClutchHistory, chosen: ChosenLife, evidence: ClutchMeasurements, filters: States | None = None
 ) -> MeasuredLife | None:
-    """A life of a clutch with all that was measured in it, None where nothing was yet."""
+    """A life of a clutch with all its measurements; None if there are none yet."""
     if chosen.life is None:
         return None
     return MeasuredLife(

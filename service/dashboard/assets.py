@@ -31,7 +31,7 @@ _IMPORTED = re.compile(r'^(?:import|export)\b[^;"]*"(\.[^"]+)";', re.MULTILINE)
 
 @dataclass(frozen=True, kw_only=True)
 class Asset:
-    """A file and how it goes out; `name` is its path in the tree, with slashes."""
+    """A static file with its media type; `name` is its path in the tree, with slashes."""
 
     name: str
     media_type: str
@@ -43,19 +43,19 @@ class Asset:
 
     @cached_property
     def compressed(self) -> bytes:
-        """Gzipped, computed when it is first requested."""
+        """The gzipped file, computed at the first request."""
         return gzip.compress(self.body, 9, mtime=0)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Assets:
-    """All that the pages load, by name; `digest` names the folder that they stand in."""
+    """All files that the pages load, by name; `digest` names the folder that they are served from."""
 
     by_name: dict[str, Asset]
     digest: str
 
     def page(self, name: str, root: str) -> Asset:
-        """A page with the addresses of its assets filled in, and before its module those of all that this imports.
+        """A page with its assets' addresses filled in, and links to preload all modules that its module imports.
 
         `root` leads from the page to the service's root: relative, so that a proxy may add a path.
         """
@@ -73,7 +73,7 @@ class Assets:
         return "\n".join([*links, script[0]])
 
     def imported(self, module: str) -> list[str]:
-        """All modules that a module imports, those that they import too."""
+        """All modules that a module imports, directly or through others."""
         names = [module]
         for name in names:
             folder = posixpath.dirname(name)
@@ -85,7 +85,7 @@ class Assets:
 
 
 def load(folder: Path = STATIC) -> Assets:
-    """Read every file of the tree."""
+    """Read all files of the tree."""
     paths = sorted(path for path in folder.rglob("*") if path.suffix in TYPES and path.is_file())
     assets = [read(path, path.relative_to(folder).as_posix()) for path in paths]
     listing = "".join(f"{asset.name} {asset.digest}\n" for asset in assets)

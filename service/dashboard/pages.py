@@ -35,7 +35,7 @@ def router(assets: Assets) -> APIRouter:
 
 
 def answer(asset: Asset, caching: str, request: Request) -> Response:
-    """A file, gzipped where the browser takes that; 304 where it has it already."""
+    """The response with a file, gzipped if the browser accepts that; 304 if the browser has it already."""
     zipped = "gzip" in request.headers.get("accept-encoding", "")
     tag = f'"{asset.digest}{"-gz" if zipped else ""}"'
     headers = {"ETag": tag, "Cache-Control": caching, "Vary": "Accept-Encoding"}

@@ -18,7 +18,7 @@ _THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 def use_one_blas_thread() -> None:
-    """Have linear algebra in this process use no threads of its own, whether its libraries are loaded or are to be."""
+    """Limit linear algebra to one thread in this process, for libraries loaded already and later."""
     os.environ.update(dict.fromkeys(_THREADS, "1"))
     threadpool_limits(limits=1, user_api="blas")
 
@@ -30,8 +30,8 @@ _KEPT_FREE, _LARGEST_KEPT = 64 << 20, 8 << 20
 
 
 def keep_memory() -> None:
-    """Have this process keep memory that arrays gave back for the next ones, where its C library can: having it mapped again
-    each time takes as long as what is computed in it. Larger arrays are mapped by themselves, as before."""
+    """Have this process keep freed array memory for the next arrays, if its C library can: mapping it again each time
+    takes as long as the computation itself. Larger arrays are still mapped one by one."""
     mallopt = getattr(ctypes.CDLL(None), "mallopt", None)
     if mallopt is not None:
         mallopt(_M_MMAP_THRESHOLD, _LARGEST_KEPT)
@@ -39,11 +39,12 @@ def keep_memory() -> None:
 
 
 def yield_to_others() -> None:
-    """Have the calling thread, or process before it starts threads, run where the processors have nothing else to do.
+    """Have the calling thread, or the process if it has no other threads yet, run only on otherwise idle processors.
 
-    On Linux by the policy SCHED_IDLE: what wakes takes such a processor as idle, and need not wait for the next balancing
-    as it does beside a thread of the lowest priority (`nice` 19), which is what other systems give, and those that refuse
-    the policy. The threads in which libraries of linear algebra help do not yield: in this process they no longer do.
+    On Linux this is the policy SCHED_IDLE: any other thread that wakes up treats such a processor as idle and starts at
+    once. Beside a thread of the lowest priority (`nice` 19) it would wait for the next balancing; that is used on other
+    systems, and if the policy is refused. Helper threads of linear algebra libraries do not yield, so this process no
+    longer uses any.
     """
     use_one_blas_thread()
     if hasattr(os, "SCHED_IDLE"):
@@ -56,7 +57,7 @@ def yield_to_others() -> None:
 
 
 def end_with_parent(end: Callable[[], object] = lambda: os._exit(3)) -> None:
-    """Have this process end when the one that started it has, however that ended."""
+    """Have this process end when its parent process ends, for whatever reason."""
     parent = multiprocessing.parent_process()
 
     def await_it() -> None:

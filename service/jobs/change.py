@@ -23,8 +23,8 @@ MAX_REASONS = 20
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ChangeTask:
-    """What is to be done: `function` (module:function) for what the job is `of`, None: for all; `at` is when it was begun,
-    `by` who asked, `arguments` what else the job was asked for with."""
+    """A job that changes results: `function` (module:function) is called for `of`, the job's subject (None: all), with
+    `arguments`; the job began at `at` and was asked for `by`."""
 
     function: str
     of: str | None
@@ -34,10 +34,10 @@ class ChangeTask:
 
 
 def main() -> None:
-    """Do what the first argument names, JSON, to the database of the environment. The last line is the answer.
+    """Run the ChangeTask in the first argument (JSON) on the database named in the environment. The last line written
+    is the answer.
 
-    Where the database is away meanwhile, the process ends so that the service has it done again: it takes hours, and a
-    restart of the database takes seconds.
+    If the database goes away meanwhile, the process ends and the service repeats the job later.
     """
     task = ChangeTask(**json.loads(sys.argv[1]))
     process.end_with_the_service()
@@ -50,7 +50,7 @@ def main() -> None:
 
 
 def done(database: Database, task: ChangeTask, say: Callable[[Json], None], executor: Executor) -> Mapping[str, object]:
-    """The result, in numbers and with the reasons why clutches were left, and the progress that was said last."""
+    """The job's result (counts, and the reason for each skipped clutch), with the latest progress."""
     module, _, name = task.function.partition(":")
     function = getattr(importlib.import_module(module), name)
     steps: list[Json] = []

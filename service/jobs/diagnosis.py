@@ -35,7 +35,8 @@ _SEED = 0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DiagnosisTask:
-    """What is to be diagnosed, by `engine` (module:function): a clutch's runs up to `last_run_key`; and what it may take.
+    """A diagnosis to be made by `engine` (module:function): of a clutch's runs up to `last_run_key`, within limits of
+    memory [bytes] and processor time [s].
 
     `isolability`: whether to say which causes its tests could tell apart."""
 
@@ -49,7 +50,8 @@ class DiagnosisTask:
 
 
 def main() -> None:
-    """Diagnose what the first argument names, JSON, in the database of the environment. The last line is the answer."""
+    """Run the DiagnosisTask in the first argument (JSON) on the database named in the environment. The last line
+    written is the answer."""
     task = DiagnosisTask(**json.loads(sys.argv[1]), database=os.environ[DATABASE_VARIABLE])
     process.end_with_the_service()
     resource.setrlimit(resource.RLIMIT_AS, (task.bytes, task.bytes))
@@ -63,7 +65,7 @@ def main() -> None:
 
 
 def diagnosed(task: DiagnosisTask, say: Callable[[Json], None] = lambda _: None) -> Mapping[str, Any]:
-    """The report in the public shape, and the extension. The same runs give the same, whatever their clutch is called."""
+    """The report as JSON, and the model extension. They depend on the runs alone, not on the clutch's name."""
     module, _, function = task.engine.partition(":")
     diagnose = getattr(importlib.import_module(module), function)
     with closing(open_database(task.database)) as database:
@@ -84,9 +86,9 @@ def diagnosed(task: DiagnosisTask, say: Callable[[Json], None] = lambda _: None)
 def read_life(
     database: Database, clutch_id: str, *, last_run_key: int, say: Callable[[Json], None] = lambda _: None
 ) -> DiagnosedLife:
-    """The present life by the runs up to `last_run_key`. Raises NotFoundError.
+    """The present life, of the runs up to `last_run_key`. Raises NotFoundError.
 
-    Channels are read run by run: no transaction stays open for longer, for commits wait for it.
+    Channels are read run by run in short transactions, because an open one delays commits.
     """
     with database.reading() as connection:
         record = repository.record(repository.clutch(connection, clutch_id))
@@ -120,7 +122,8 @@ def read_life(
 def before_and_after(
     database: Database, clutch_id: str, diagnosed_life: DiagnosedLife, extension: Extension | None
 ) -> tuple[LifePrediction | None, LifePrediction | None]:
-    """The particle filter's prediction of the life that was diagnosed, by both models; alike where there is no extension."""
+    """The particle filter's prediction for the diagnosed life by the model in force and by the extended one; equal if
+    there is no extension."""
     if diagnosed_life.life is None:
         return None, None
     with database.reading() as connection:

@@ -38,7 +38,7 @@ class ExecutorUnavailableError(Exception):
 
 
 class WorkerLostError(Exception):
-    """The process that worked on an input has ended, at each repetition too."""
+    """The process working on an input has ended, at each repetition too."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,15 +66,15 @@ class Executor(ABC):
     def map(
         self, function: Callable[[Item], Result], items: Iterable[Item], *, in_order: bool = True
     ) -> Iterator[Outcome[Result]]:
-        """`function(item)` for each item; outcomes in the order of the items, or as they come.
+        """Compute `function(item)` for each item; yields outcomes in the order of the items, or as they come.
 
-        Items are taken from the iterable as they are needed: a few for each worker are in memory at once. An error of
-        the function is an outcome, an error of the iterable is raised. Whoever stops iterating drops what waits.
-        Raises ExecutorUnavailableError where the cluster cannot be used.
+        Items are taken from the iterable as they are needed: a few per worker are in memory at once. An error of the
+        function is an outcome, an error of the iterable is raised. If the caller stops iterating, waiting items are
+        dropped. Raises ExecutorUnavailableError if the cluster cannot be used.
         """
 
     def close(self) -> None:  # noqa: B027  (this process has nothing to end)
-        """End all work at once, from any thread."""
+        """Stop all work at once; may be called from any thread."""
 
     def __enter__(self) -> Self:
         return self
@@ -84,7 +84,7 @@ class Executor(ABC):
 
 
 def called(function: Callable[[Item], Result], item: Item) -> tuple[Result | None, Exception | None]:
-    """The result of a function, or its error as it arrives from another process."""
+    """A function's result, or its error in a form that can be sent to another process."""
     try:
         return function(item), None
     except Exception as error:  # noqa: BLE001  (an outcome, given to who asked)
@@ -92,7 +92,7 @@ def called(function: Callable[[Item], Result], item: Item) -> tuple[Result | Non
 
 
 def _carried(error: Exception) -> Exception:
-    """The error where it survives pickling, else one that says the same."""
+    """The error if it can be pickled, else a picklable one with the same message."""
     try:
         pickle.loads(pickle.dumps(error))  # noqa: S301  (its own bytes)
     except Exception:  # noqa: BLE001  (whatever an exception's own pickling raises)
@@ -101,10 +101,10 @@ def _carried(error: Exception) -> Exception:
 
 
 class InProcess(Executor):
-    """The executor `local`: a thread of this process, which yields to all others.
+    """The executor `local`: computes in a thread of this process that yields to all others.
 
-    The thread that asks loads and stores, for others may wait for its locks. An interrupt (Ctrl-C) ends it without waiting
-    for the computation, which ends with the process.
+    The calling thread loads and stores, because others may wait for its locks. An interrupt (Ctrl-C) ends it without
+    waiting for the computation, which ends with the process.
     """
 
     elsewhere = False
@@ -147,7 +147,7 @@ MAX_LOST = 3
 
 @dataclass(slots=True)
 class _Task:
-    """An input on its way, and how often its process has ended."""
+    """An input being computed, and how often its process has ended."""
 
     index: int
     item: Any
@@ -155,7 +155,7 @@ class _Task:
 
 
 class _RemoteExecutor(Executor):
-    """An executor whose processes get inputs one by one."""
+    """An executor that sends inputs to other processes one by one."""
 
     elsewhere = True
     #: What a future raises whose process has ended, and what is said of it then.
@@ -163,14 +163,14 @@ class _RemoteExecutor(Executor):
 
     @abstractmethod
     def width(self) -> int:
-        """How many inputs are to be on their way at once."""
+        """The maximum number of inputs sent and not yet answered."""
 
     @abstractmethod
     def submit(self, function: Callable[[Any], Any], item: Any) -> "Future[Any]":
-        """A future of `called(function, item)`."""
+        """Send the call `called(function, item)` to a process; returns its future."""
 
     def require_any_worker(self) -> None:
-        """Raise ExecutorUnavailableError where nobody computes any more."""
+        """Raise ExecutorUnavailableError if no worker is left."""
 
     def map(
         self, function: Callable[[Item], Result], items: Iterable[Item], *, in_order: bool = True
@@ -215,13 +215,13 @@ class _RemoteExecutor(Executor):
                 future.cancel()
 
     def _first(self, futures: Iterable["Future[Any]"]) -> set["Future[Any]"]:
-        """Those that have ended, once one has."""
+        """Wait until a future has ended; returns all that have."""
         while not (ended := wait(futures, _COUNT_SECONDS, FIRST_COMPLETED).done):
             self.require_any_worker()
         return ended
 
     def _outcome(self, future: "Future[Any]") -> tuple[Any, Exception | None]:
-        """What `called` returned: a result, or the error of the function; a WorkerLostError where its process has ended.
+        """A finished call's result, or its error; a WorkerLostError if the process ended before it answered.
 
         Raises ExecutorUnavailableError where a worker is of another release.
         """
@@ -245,7 +245,7 @@ INPUTS_AHEAD = 2
 
 
 class Processes(_RemoteExecutor):
-    """The executor `processes:N`. A process that ends is replaced, and what it did is done again."""
+    """The executor `processes:N`. A process that ends is replaced, and its work is repeated."""
 
     lost = BrokenExecutor, "the process that computed this ended at each attempt"
 
@@ -277,14 +277,13 @@ class Processes(_RemoteExecutor):
 
 
 class _Pool(ProcessPoolExecutor):
-    """Processes that end with this one, and leave an interrupt to it."""
+    """A process pool whose processes end with this one and leave Ctrl-C to it."""
 
     def __init__(self, processes: int) -> None:
         super().__init__(processes, mp_context=multiprocessing.get_context("forkserver"), initializer=_begin)
 
     def end(self) -> None:
-        """End the processes at once; by SIGKILL, for they are deaf to SIGTERM where a service's workers began what forks
-        them."""
+        """Kill the pool's processes at once, by SIGKILL: those forked below a service's workers have SIGTERM blocked."""
         for process in list((self._processes or {}).values()):
             process.kill()
         self.shutdown(wait=True, cancel_futures=True)
@@ -304,12 +303,12 @@ _OF_RESULTS = ("clutchlife", "numpy", "scipy")
 
 @cache
 def release() -> dict[str, str]:
-    """The versions that decide on results, by name."""
+    """The versions that results depend on (code, Python, numerical libraries), by name."""
     return {"python": platform.python_version()} | {name: version(name) for name in _OF_RESULTS}
 
 
 class Cluster(_RemoteExecutor):
-    """The executor of a scheduler's address. What a worker did that has ended is done again by another."""
+    """The executor for the address of a Dask scheduler. If a worker ends, another repeats its work."""
 
     def __init__(self, address: str) -> None:
         try:
@@ -353,7 +352,7 @@ class Cluster(_RemoteExecutor):
         return super()._outcome(future)
 
     def _count(self) -> None:
-        """See how many threads there are, now and then."""
+        """Update the number of the cluster's threads, if the last count is old."""
         now = time.monotonic()
         if now - self._counted > _COUNT_SECONDS:
             self._threads = sum(self._client.nthreads().values())
@@ -366,7 +365,7 @@ class Cluster(_RemoteExecutor):
             raise ExecutorUnavailableError(f"{self.address}: the Dask scheduler has no worker any more")
 
     def _require_workers(self) -> None:
-        """At least one worker, and none of another release."""
+        """Wait for a first worker, and raise ExecutorUnavailableError if none comes or one has another release."""
         try:
             self._client.wait_for_workers(1, timeout=WORKER_SECONDS)
         except TimeoutError as error:
@@ -384,7 +383,7 @@ class Cluster(_RemoteExecutor):
 
 
 def _difference(wanted: Mapping[str, str]) -> str | None:
-    """How this process's release differs from what is wanted, in words; None where it does not."""
+    """A sentence on how this process's versions differ from the wanted ones; None if they agree."""
     own = release()
     differing = [
         f"{name} {own.get(name)} instead of {wanted[name]}" for name in wanted if own.get(name) != wanted[name]
@@ -393,7 +392,7 @@ def _difference(wanted: Mapping[str, str]) -> str | None:
 
 
 def _called(wanted: Mapping[str, str], function: Callable[[Any], Any], item: Any) -> tuple[Any, Exception | None]:
-    """`called`, in a worker of the same release: workers may join at any time."""
+    """`called`, after a check that this worker has the wanted release: workers may join at any time."""
     difference = _difference(wanted)
     if difference is not None:
         raise ExecutorUnavailableError(f"a worker of the cluster: {difference}")
@@ -405,8 +404,8 @@ _prepare = cache(use_one_blas_thread)
 
 
 def executor_of(scheduler: str) -> Executor:
-    """`local`: a thread of this process that yields; `processes[:N]`: a pool of N, or of a process a core;
-    `tcp://host:port`: a Dask cluster.
+    """The executor for a setting: `local`: a thread of this process that yields; `processes[:N]`: a pool of N processes
+    (default: one per core); `tcp://host:port`: a Dask cluster.
 
     Raises ValueError on anything else, ExecutorUnavailableError where the cluster cannot be used.
     """
@@ -423,7 +422,7 @@ def executor_of(scheduler: str) -> Executor:
 
 
 class Ending(Enum):
-    """How a name ended."""
+    """How the work on a name ended."""
 
     STORED = "its result is stored"
     NOTHING = "there was nothing to compute"
@@ -433,7 +432,7 @@ class Ending(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ended(Generic[Result]):
-    """A name's end: its result where that is stored, the error where there was one."""
+    """How the work on a name ended, with its result if that was stored and its error if there was one."""
 
     name: str
     ending: Ending
@@ -450,7 +449,8 @@ def in_rounds(
     store: Callable[[Item, Result], bool],
     rounds: int,
 ) -> Iterator[Ended[Result]]:
-    """The names as they end. `load` gives None where there is nothing to do, `store` False where the item holds no more."""
+    """Load, compute and store each name; yields each name as it ends. `load` returns None if there is nothing to do.
+    `store` returns false if the item is out of date; the name is then repeated, in at most `rounds` rounds."""
     for left in reversed(range(rounds)):
         to_repeat = []
         for ended in _round(executor, names, load, compute, store):

@@ -34,16 +34,17 @@ _log = logging.getLogger("clutchlife")
 
 
 class AwayError(Exception):
-    """The job did not come to its end, because the database was away for a while: it is to be done again."""
+    """The job was interrupted because the database was away for a while, and is to be repeated."""
 
 
 class FailedError(Exception):
-    """The job did not come to its end; the message says why to the one who asked."""
+    """The job failed; the message tells its sender why."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Work:
-    """What a process is to do: `modules` run with `task` as their argument, JSON, for at most `longest` [s] by the clock.
+    """The task of a worker process: it runs `modules` with `task` as their argument (JSON), for at most `longest` [s]
+    of wall-clock time.
 
     `processor_seconds` is the processor time after which it ends itself, by SIGXCPU; None: it does not.
     """
@@ -62,7 +63,8 @@ class Child:
         self._deadline = time.monotonic() + work.longest
 
     def ends_within(self, seconds: float) -> bool:
-        """Wait for its end, at most so long. Raises FailedError where it has taken too long by the clock."""
+        """Wait up to this many seconds for the process to end; true once it has. Raises FailedError where it has taken
+        too long by the clock."""
         try:
             self._process.wait(timeout=max(0.0, min(seconds, self._deadline - time.monotonic())))
         except subprocess.TimeoutExpired:
@@ -72,12 +74,12 @@ class Child:
         return True
 
     def progress(self) -> Json | None:
-        """How far it says it has come; None where it has not said so yet."""
+        """The latest progress that the process reported; None before its first report."""
         steps = [line for line in self._lines() if line.startswith(PROGRESS)]
         return json.loads(steps[-1].removeprefix(PROGRESS)) if steps else None
 
     def written(self, name: str) -> Mapping[str, Any]:
-        """What the process, which has ended, wrote as its answer; what it complained of is logged under the job's `name`.
+        """The answer that the ended process wrote; its error output is logged under the job's `name`.
 
         Raises FailedError; AwayError where the database did not answer, so that the job can be done again.
         """
@@ -107,14 +109,14 @@ class Child:
         return answer
 
     def _lines(self) -> list[bytes]:
-        """The whole lines that it has written so far: it alone moves the place in the file."""
+        """The complete lines that the process has written so far. Only this method moves the position in the file."""
         size = os.fstat(self._answer.fileno()).st_size
         return os.pread(self._answer.fileno(), size, 0).split(b"\n")[:-1]
 
 
 @contextmanager
 def running(work: Work, database_url: str) -> Iterator[Child]:
-    """A process that does the work; killed at the end where it runs still."""
+    """Context with a process that does the work; the process is killed at the end if it still runs."""
     # warnings of numerics are logged, those of libraries to their authors are not
     warned = "-W", "ignore", "-W", "default::RuntimeWarning"
     command = [sys.executable, "-P", *warned, "-m", *work.modules, json.dumps(work.task)]
@@ -134,7 +136,7 @@ def running(work: Work, database_url: str) -> Iterator[Child]:
 
 
 def end_with_the_service() -> None:
-    """Have this process end when its service does, however that comes; what it held in memory goes to no file."""
+    """Have this process end when its service ends, for whatever reason, and write no core dump."""
 
     def await_end() -> None:  # of standard input, a pipe held open by the service
         while os.read(0, 1):  # not by way of sys.stdin, whose lock would be in the way when this process ends
@@ -151,5 +153,5 @@ def say(progress: Json) -> None:
 
 
 def answer(ended: Mapping[str, Any]) -> None:
-    """Write the last line: how the job ended."""
+    """Write the answer, the last line of the process's output."""
     sys.stdout.write(f"{json.dumps(ended, allow_nan=False)}\n")

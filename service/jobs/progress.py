@@ -13,7 +13,8 @@ LINE_SECONDS = 20.0
 
 @contextmanager
 def progress(console: Console, title: str) -> Iterator[Callable[..., None]]:
-    """What to call as `count` (1) more inputs are done with, or with a `total` once that is known; shown on the console."""
+    """Context that shows progress on the console: call the yielded function with the `count` of inputs just finished,
+    or with their `total` once it is known."""
     if console.is_terminal:
         columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
         with Progress(*columns, console=console, transient=True) as shown:

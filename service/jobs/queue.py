@@ -35,14 +35,14 @@ CLOCK_PER_PROCESSOR_SECOND = 6.0
 
 @dataclass(frozen=True, slots=True)
 class JobKind:
-    """How a kind's jobs are done; `finish` stores how one ended: what its process answered, or its `problem`."""
+    """How jobs of one kind are done; `finish` stores the process's answer, or the `problem`."""
 
     work: Callable[[JobRow, Settings], Work]
     finish: Callable[[JobRow, Mapping[str, Any]], None]
 
 
 def diagnosis_work(job: JobRow, settings: Settings) -> Work:
-    """A diagnosis only reads and computes: all of its process yields to others."""
+    """The task of a diagnosis's process. It only reads and computes, so all of it yields to other processes."""
     return Work(
         modules=("service.jobs.background", "service.jobs.diagnosis"),
         task={
@@ -59,7 +59,8 @@ def diagnosis_work(job: JobRow, settings: Settings) -> Work:
 
 
 def work_of_change(function: str) -> Callable[[JobRow, Settings], Work]:
-    """A change stores what it computes, which the one thread of its process does that does not yield.
+    """A function from a job to its process's task, for jobs that store results. The thread that stores does not yield
+    to other processes; the one that computes does.
 
     `function` is `module:function`, called as `replay.as_job` is.
     """
@@ -94,24 +95,24 @@ _log = logging.getLogger("clutchlife")
 
 
 class Leases:
-    """Since when jobs are held as they are, as one thread has seen it."""
+    """Since when each job has been held without renewal, by this process's own clock."""
 
     def __init__(self, seconds: float) -> None:
         self._seconds = seconds
         self._since: dict[Hold, float] = {}
 
     def ended(self, holds: Sequence[Hold]) -> list[Hold]:
-        """Those of all present holds that were not renewed for so many seconds."""
+        """The present holds that have not been renewed during one lease."""
         now = time.monotonic()
         self._since = {hold: self._since.get(hold, now) for hold in holds}
         return [hold for hold, since in self._since.items() if now - since >= self._seconds]
 
 
 class JobQueue:
-    """The threads that do jobs. `start` it once the database is open, `close` it before that is closed."""
+    """The threads that run jobs. `start` it once the database is open, `close` it before the database closes."""
 
     def __init__(self, database: Database, settings: Settings, groups: Sequence[Mapping[str, JobKind]]) -> None:
-        """`groups`: how jobs are done, by their kind; of each group one job at a time."""
+        """`groups`: the kinds of jobs, by name; each group has one thread, which runs one job at a time."""
         self._database = database
         self._settings = settings
         self._lease = float(settings.job_lease_seconds)
@@ -126,7 +127,7 @@ class JobQueue:
         ]
 
     def start(self) -> None:
-        """Begin. Of a file's jobs none is held by another: one service uses it, and the lock says that it is this."""
+        """Start the threads. A database file has one service, so its jobs held by an earlier process are released."""
         if self._database.path is not None:
             with self._database.writing() as connection:
                 jobs.release_all(connection)
@@ -134,7 +135,7 @@ class JobQueue:
             thread.start()
 
     def close(self) -> None:
-        """End what runs, give it back to be done later or by another service, and stop."""
+        """Stop the threads: running jobs are interrupted and released, to be done later or by another service."""
         with self._change:
             self._closing = True
             self._change.notify_all()
@@ -146,13 +147,13 @@ class JobQueue:
         return all(thread.is_alive() for thread in self._threads)
 
     def wake(self) -> None:
-        """Look now for what is to be done: something was asked for here."""
+        """Look for new jobs now, because this service has just queued one."""
         with self._change:
             self._wakes += 1
             self._change.notify_all()
 
     def _work(self, group: Mapping[str, JobKind]) -> None:
-        """Do the jobs of a group one after the other; where none is free, wait until the queue is woken, or for a pause."""
+        """Run the jobs of a group one after the other; if none is free, wait for `wake` or a pause."""
         seen, leases = 0, Leases(self._lease)
 
         def woken() -> bool:
@@ -171,7 +172,7 @@ class JobQueue:
                 seen = self._wakes
 
     def _claimed(self, group: Mapping[str, JobKind], leases: Leases) -> JobRow | None:
-        """The next job of a group, claimed; None where there is none, or the database is away for a while."""
+        """The next job of a group, claimed by this service; None if there is none or the database is away."""
         try:
             with self._database.reading() as connection:
                 ended = leases.ended(jobs.holds(connection, group))
@@ -199,7 +200,7 @@ class JobQueue:
             self._give_up(job, kind)
 
     def _stored(self, job: JobRow, kind: JobKind, ended: Mapping[str, Any]) -> None:
-        """Have its end stored, the lease prolonged meanwhile: what is adopted is tracked again first."""
+        """Store the job's end while its lease is renewed, because an adopted model is tracked again first."""
         done = threading.Event()
         renewing = threading.Thread(target=self._renew_until, args=(done, job), name="lease", daemon=True)
         renewing.start()
@@ -222,8 +223,8 @@ class JobQueue:
             pass
 
     def _give_up(self, job: JobRow, kind: JobKind) -> None:
-        """Its end could not be stored: say at least that it ended, at the least of the job itself, or leave that to who
-        claims it next."""
+        """Mark the job as failed after its end could not be stored, by its kind's `finish` or else in its row alone; if
+        both fail, the next claimer deals with it."""
         for end in (partial(kind.finish, job, {"problem": UNSTORED}), partial(self._end_as_failed, job)):
             try:
                 end()
@@ -237,7 +238,8 @@ class JobQueue:
             jobs.end(connection, job.job_id, jobs.FAILED, _now(), problem=UNSTORED, claimer=job.claimed_by)
 
     def _outcome(self, job: JobRow, kind: JobKind) -> Mapping[str, Any] | None:
-        """What its process wrote, or a problem; None where it is not to be ended now: by another service, or later."""
+        """The answer of the job's process, or its `problem`; None if this service must not end the job, because it is
+        cancelled, held by another service, or to be repeated later."""
         if job.attempts > MAX_ATTEMPTS:
             return {"problem": GIVEN_UP}
         try:
@@ -253,7 +255,8 @@ class JobQueue:
             return {"problem": UNDONE}
 
     def _watch_to_end(self, job: JobRow, process: Child) -> bool:
-        """Wait for the process' end, the lease prolonged; False where it is to be ended before. Raises FailedError."""
+        """Wait for the process to end while the lease is renewed; false if the job must be stopped earlier. Raises
+        FailedError."""
         due = time.monotonic() + self._pause
         while not process.ends_within(min(self._pause, _LOOK)):
             if self._closing:

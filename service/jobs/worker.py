@@ -38,9 +38,9 @@ _BEAT = 1.0
 
 
 def begin(database_url: str, nice: int | None, log: tuple[logging.LogFormat, logging.LogLevel]) -> Database:
-    """Prepare this process, and open its database. It logs so; it yields by `nice` or, where that is None, to all others; it
-    ends with the service, and leaves it to the service to stop: what stops all processes at once must not take a run from
-    it that is being stored."""
+    """Prepare this worker process and open its database. It logs like the service, yields to other processes by `nice`
+    (None: entirely) and ends with the service. It ignores SIGINT and ends only a while after SIGTERM: a signal to all
+    processes at once must not interrupt the storing of a run."""
     logging.configure(*log)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, _end_later)
@@ -61,9 +61,10 @@ def begin(database_url: str, nice: int | None, log: tuple[logging.LogFormat, log
 def main(
     line: Connection, database_url: str, nice: int | None, log: tuple[logging.LogFormat, logging.LogLevel]
 ) -> None:
-    """Make the calls that come over the line and answer with what each returns or raises, until its other end is closed.
+    """A worker process: makes the calls received over the connection and sends back their results or errors, until the
+    other end is closed.
 
-    Each second, and once it is ready, it says that it is there, whatever it does.
+    Once ready, and each second, it sends a sign of life, also during a call.
     """
     sending = threading.Lock()
 
@@ -85,7 +86,7 @@ def main(
 
 
 def _answered(database: Database, message: bytes) -> tuple[Any, BaseException | None]:
-    """What a call returns, or raises with where it was raised."""
+    """A call's result, or its error with the traceback as a note."""
     try:
         function, arguments, request, trace = pickle.loads(message)  # noqa: S301  (of our own service)
         logging.request_id.set(request)
@@ -104,7 +105,7 @@ def _beat(send: Callable[[None], None]) -> None:
 
 
 def load(_: Database) -> None:
-    """Nothing: what nearly every call needs is loaded when a process begins."""
+    """Does nothing; calling it makes a new process load the libraries that nearly every call needs."""
 
 
 def _end_later(*_: object) -> None:

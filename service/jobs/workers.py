@@ -52,11 +52,11 @@ ENDING = "the service is shutting down: send the request again later"
 
 
 class Lane(Enum):
-    """What waits for what: runs that are taken in, answers that somebody waits for, simulations, long and raw records,
-    files from outside, and answers that are made again while the last ones are given.
+    """The kinds of calls, each with its own queue and workers: runs to store, requested answers, simulations, long and
+    raw records, uploaded files, and renewals of cached answers in the background.
 
-    The values are by how much a lane's processes yield [nice], None to all others; what takes the write lock yields little.
-    Chosen by `make load`.
+    A lane's value is the niceness of its processes, None: they yield to all others; lanes that take the write lock
+    yield little. Chosen by `make load`.
     """
 
     RUNS = 1
@@ -86,10 +86,10 @@ Note = Callable[[Lane, int], None]
 
 @dataclass(slots=True, eq=False, kw_only=True)
 class _Call:
-    """A call on its way, made for the request with that id, below its span `trace`; `retried` once its process ended
-    without an answer.
+    """A queued or running call, for the request with that id, below its tracing span `trace`; `retried`: its process
+    once ended without an answer.
 
-    `begun`: when it was given to a worker, None while it waits.
+    `begun`: when a worker got it, None while it waits.
     """
 
     lane: Lane
@@ -106,44 +106,45 @@ class _Call:
     answer: "Future[Any]" = field(default_factory=Future)
 
     def is_overdue(self, now: float) -> bool:
-        """Whether it runs for longer than it may, and has not been answered."""
+        """Whether the call is unanswered and has run for longer than allowed."""
         return self.begun is not None and now - self.begun > self.seconds and not self.answer.done()
 
 
 class _LostError(Exception):
-    """The process has ended before it answered."""
+    """The worker process ended before it answered."""
 
 
 class _Worker(ABC):
-    """What makes a lane's calls, one at a time; its own thread calls all but `check`, which waits for nothing. Without a
-    process of its own it is always there, and ends by itself."""
+    """Makes the calls of a lane, one at a time. All methods but `check` and `stop` belong to the worker's own thread;
+    `check` never waits. This base class has no process, so it needs no start, check or end."""
 
     #: Whether it has ended, or been ended, and is not there again.
     lost = False
 
     @abstractmethod
     def call(self, call: _Call) -> Any:
-        """What the call's function returns or raises. Raises _LostError."""
+        """The result of the call's function; raises the function's error. Raises _LostError."""
 
     def look(self) -> bool:
-        """See that it is there, and start it where it is not; whether it is."""
+        """Starts the process if needed; true if it runs."""
         return True
 
     def check(self, now: float) -> None:  # noqa: B027  (a thread cannot be ended)
-        """End what does not answer."""
+        """Kill the process if it has not answered for too long."""
 
     def stop(self) -> None:  # noqa: B027  (as above: who asked has been answered)
-        """End it, whatever it does."""
+        """Kill the process at once, even during a call."""
 
     def end(self) -> None:  # noqa: B027  (as above)
-        """End it: it has nothing to do."""
+        """End the idle process in an orderly way."""
 
 
 class Workers:
-    """The lanes. `submit` from any thread; `close` at the end."""
+    """The queues and workers of all lanes. `submit` may be called from any thread; `close` at the end."""
 
     def __init__(self, make: Callable[[Lane], _Worker], sizes: dict[Lane, int], note: Note) -> None:
-        """`make` makes a worker of a lane, of which there are at most so many; `note` hears of each change."""
+        """`make` creates a worker of a lane; `sizes`: the maximum number of workers by lane; `note` is called at each
+        change of a lane's number of calls."""
         self._make = make
         self._note = note
         self._sizes = sizes
@@ -169,10 +170,12 @@ class Workers:
         seconds: float | None = None,
         patience: float = PATIENCE,
     ) -> "Future[Any]":
-        """Have `function(database, *arguments)` called; calls of the same `turn` run one after the other.
+        """Queue the call `function(database, *arguments)` and return its future; calls with the same `turn` run one
+        after the other.
 
-        Function, arguments and result must be picklable. The call waits `patience` [s] at most to be begun and then may take
-        `seconds`, left out those of its lane; else the answer is a BusyError. Raises BusyError where too many wait.
+        Function, arguments and result must be picklable. The future gets a BusyError if the call waits for longer than
+        `patience` [s] or runs for longer than `seconds` (default: of its lane). Raises BusyError if too many calls
+        wait.
         """
         call = _Call(
             lane=lane,
@@ -208,13 +211,13 @@ class Workers:
             return dict(self._calls)
 
     def ended(self) -> list[Lane]:
-        """Lanes of which a process has ended, or was ended because it did not answer, and the next one is not up yet."""
+        """Lanes with a process that has ended or was killed and is not yet replaced."""
         with self._lock:
             lost = {lane for worker, (lane, _) in self._workers.items() if worker.lost}
         return [lane for lane in Lane if lane in lost]
 
     def oldest(self) -> tuple[Lane, float] | None:
-        """The lane of the call that has run longest, and for how long [s]; None where none runs."""
+        """The lane of the longest-running call and its duration [s]; None if no call runs."""
         with self._lock:
             running = [(call.begun, call.lane) for _, call in self._workers.values() if call and call.begun is not None]
         if not running:
@@ -223,12 +226,12 @@ class Workers:
         return lane, time.monotonic() - begun
 
     def warm(self) -> None:
-        """Have the processes that take in runs started and loaded; waits for nothing."""
+        """Start and load the processes of the lane of runs, without waiting for them."""
         for _ in range(self._sizes[Lane.RUNS]):
             self.submit(Lane.RUNS, worker.load, patience=math.inf)
 
     def close(self) -> None:
-        """End the lanes, once what runs has ended, and for so long; what waits is refused."""
+        """Refuse waiting calls, give running ones a limited time to end, then kill the remaining processes."""
         with self._lock:
             self._closing = True
             waiting = [call for queue in (*self._queues.values(), *self._turns.values()) for call in queue]
@@ -247,7 +250,7 @@ class Workers:
         self._watching.join()
 
     def _queue(self, call: _Call) -> None:
-        """Let a worker of its lane take the call; the lock is held."""
+        """Put the call into its lane's queue and wake or add a worker; the caller holds the lock."""
         lane = call.lane
         self._queues[lane].append(call)
         if self._idle[lane] < len(self._queues[lane]) and len(self._threads[lane]) < self._sizes[lane]:
@@ -257,7 +260,7 @@ class Workers:
         self._ready[lane].notify()
 
     def _work(self, lane: Lane) -> None:
-        """A worker's own thread."""
+        """The loop of a worker's own thread."""
         worker = self._make(lane)
         with self._lock:
             self._workers[worker] = (lane, None)
@@ -271,7 +274,7 @@ class Workers:
             del self._workers[worker]
 
     def _next(self, lane: Lane, worker: _Worker) -> _Call | None:
-        """The lane's next call, begun; None where there was none for a while."""
+        """The lane's next call, marked as begun; None if none came for a while."""
         with self._lock:
             self._idle[lane] += 1
             if not self._queues[lane] and not self._closing:
@@ -306,12 +309,12 @@ class Workers:
         _answer(call, error, result)
 
     def _count(self, lane: Lane, change: int) -> None:
-        """Change the count of calls of a lane that wait or run; the lock must be held."""
+        """Change a lane's count of waiting and running calls; the caller holds the lock."""
         self._calls[lane] += change
         self._note(lane, self._calls[lane])
 
     def _ended(self, call: _Call) -> None:
-        """The next of its turn may be begun; the lock is held."""
+        """Queue the next call with the same `turn`; the caller holds the lock."""
         self._count(call.lane, -1)
         if call.turn is None:
             return
@@ -322,7 +325,7 @@ class Workers:
             del self._turns[call.turn]
 
     def _watch(self) -> None:
-        """Look at all processes and calls, again and again, and wait for none of them."""
+        """Check all processes and calls at intervals, without waiting for any of them."""
         looked = time.monotonic()
         while not self._closed.wait(_LOOK):
             now = time.monotonic()
@@ -332,7 +335,7 @@ class Workers:
             looked = now
 
     def _refuse_late(self, now: float) -> None:
-        """Refuse as busy what has waited for too long to be begun."""
+        """Answer calls that waited longer than their patience with BusyError."""
         with self._lock:
             refused = [
                 call for queue in self._queues.values() for call in queue if now - call.queued_at > call.patience
@@ -353,7 +356,7 @@ class Workers:
             )
 
     def _stop_overdue(self, now: float) -> None:
-        """End the processes that do not answer, and those whose call takes longer than it may."""
+        """Kill the processes that do not answer and those with an overdue call."""
         with self._lock:
             running = [(each, call) for each, (_, call) in self._workers.items()]
         for each, call in running:
@@ -370,7 +373,7 @@ class Workers:
 
 
 def _answer(call: _Call, error: BaseException | None, result: Any = None) -> None:
-    """Answer who asked, unless that was done: a call that was refused may come to its end all the same."""
+    """Set the call's result or error, unless it has one already: a refused call may still come to its end."""
     with suppress(InvalidStateError):
         if error is None:
             call.answer.set_result(result)
@@ -385,7 +388,7 @@ def _join(threads: Iterable[threading.Thread], seconds: float) -> None:
 
 
 class _Here(_Worker):
-    """Calls in the thread itself."""
+    """A worker without a process: calls run in its own thread."""
 
     def __init__(self, database: Database) -> None:
         self._database = database
@@ -397,7 +400,7 @@ class _Here(_Worker):
 
 
 class _WorkerProcess(_Worker):
-    """Calls in a process, which `arguments` (the database, how it yields and logs) begin.
+    """A worker with a process, started with `arguments` (the database, its niceness, its logging).
 
     Only `check` and `stop` are called from other threads; they end processes and wait for nothing.
     """
@@ -454,7 +457,7 @@ class _WorkerProcess(_Worker):
             self._starter.see_out(self._process)
 
     def _receive(self) -> Any:
-        """Its next message: an answer, an empty one once it is ready, or None where it says that it is there."""
+        """The process's next message: an answer, an empty one once it is ready, or None as a sign of life."""
         message = self._line.recv()
         self._heard = time.monotonic()
         if message is not None:
@@ -469,7 +472,7 @@ class _WorkerProcess(_Worker):
             self._starting, self._heard = None, time.monotonic()
 
     def _lose(self) -> None:
-        """Forget the process, which has ended, was ended or could not start; the next look starts another."""
+        """Forget a process that ended, was killed or could not start; the next `look` starts another."""
         self.lost = True
         if self._line is not None:
             _kill(self._process.pid)
@@ -478,7 +481,8 @@ class _WorkerProcess(_Worker):
 
 
 class _Starter:
-    """Starts processes off one that has loaded the libraries, and has another do so where that one does not answer."""
+    """Starts worker processes from a fork server with the libraries loaded, and replaces a fork server that does not
+    answer."""
 
     def __init__(self) -> None:
         self._context = multiprocessing.get_context("forkserver")
@@ -487,8 +491,8 @@ class _Starter:
         self.begin()
 
     def begin(self) -> None:
-        """Start what the workers are forked off, deaf to SIGTERM as it is while this process is: with it all workers would
-        be taken for dead where a whole unit is stopped. It ends when this process does."""
+        """Start the fork server with SIGTERM blocked, for it inherits this process's signal mask: if SIGTERM to a whole
+        systemd unit ended it, all workers would be taken for dead. It ends when this process does."""
         resource_tracker.ensure_running()  # which would hear again what is blocked
         signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGTERM})
         try:
@@ -497,7 +501,8 @@ class _Starter:
             signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})
 
     def start(self, arguments: tuple[Any, ...]) -> tuple[Any, Any]:
-        """A process and the line to it. Raises EOFError or OSError where what starts it has ended meanwhile."""
+        """Start a process; returns it and the connection to it. Raises EOFError or OSError if the fork server ended
+        meanwhile."""
         self.begin()
         ours, theirs = self._context.Pipe()
         process = self._context.Process(target=worker.main, args=(theirs, *arguments))
@@ -512,19 +517,20 @@ class _Starter:
         return process, ours
 
     def check(self, starting: float, now: float) -> None:
-        """End what starts processes where one is `starting` since then, and it has had its time."""
+        """Kill the fork server if a process has been `starting` for too long."""
         if now - max(starting, self._moved) > self._limit:
             self._limit, self._moved = _LOADING, now
             self.stop()
 
     def stop(self) -> None:
-        """End what starts processes: the next start begins another."""
+        """Kill the fork server; the next start begins another."""
         pid = forkserver._forkserver._forkserver_pid  # type: ignore[attr-defined]  # noqa: SLF001  (nothing else names it)
         if pid is not None:
             _kill(pid)
 
     def see_out(self, process: Any) -> None:
-        """Wait for the end of a process that has been told to end; whoever exits waits for all that it started."""
+        """Wait for a process told to end, and kill it if it does not: this process waits at its exit for all its
+        children."""
         process.join(_SILENCE)
         if process.is_alive():
             _kill(process.pid)
@@ -545,7 +551,7 @@ def in_processes(
     log: tuple[LogFormat, LogLevel] = ("auto", "warning"),
     note: Note = lambda _lane, _count: None,
 ) -> Workers:
-    """Workers in processes of their own, which log so: `processes` that take in runs, one for each other lane."""
+    """Workers in processes of their own, with this logging: `processes` for the lane of runs, one for each other lane."""
     starter = _Starter()
 
     def make(lane: Lane) -> _Worker:

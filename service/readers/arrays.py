@@ -43,7 +43,7 @@ Tree = Mapping[str, Any]
 
 @dataclass(frozen=True, slots=True)
 class Leaf:
-    """An array that is read by slicing, what is attached to it, and the array of its times where the file refers to one."""
+    """An array to be read in slices, with its attributes and, if the file refers to one, the array of its times."""
 
     data: Any
     attributes: Mapping[str, Any] = field(default_factory=dict)
@@ -52,7 +52,7 @@ class Leaf:
 
 @dataclass(frozen=True, slots=True)
 class _Source:
-    """A column and how its values are read."""
+    """A column with the means to read its values."""
 
     column: FileColumn
     leaf: Leaf
@@ -60,7 +60,7 @@ class _Source:
 
 
 def table_of(tree: Tree, reading: Reading, limits: Limits, unread: tuple[str, ...] = ()) -> Table:
-    """The table of a tree of arrays, or of the folder that is named; `unread` are names of what only their program reads.
+    """The table of a tree of arrays, or of its named folder; `unread`: names of values that only MATLAB can read.
 
     Raises InvalidError where it holds no array that could be a channel.
     """
@@ -103,7 +103,7 @@ def table_of(tree: Tree, reading: Reading, limits: Limits, unread: tuple[str, ..
 
 
 def _stated_of(tree: Tree, group: str) -> dict[str, float | str]:
-    """What a folder states, by its path."""
+    """The single numbers and texts in a folder, by the folder's path."""
     for name in filter(None, group.split("/")):
         held = tree.get(name)
         tree = held if isinstance(held, Mapping) else {}
@@ -111,7 +111,8 @@ def _stated_of(tree: Tree, group: str) -> dict[str, float | str]:
 
 
 def _paired(tree: Tree) -> Tree:
-    """The tree with arrays and what is said of them in one folder, where they stand as `C1_Data` beside `C1_Header`."""
+    """The tree with each array and its description moved into one folder, if they are stored as `C1_Data` beside
+    `C1_Header`."""
     paired = dict(tree)
     headers = {key.lower(): value for key, value in tree.items() if isinstance(value, Mapping)}
     for key, value in tree.items():
@@ -123,7 +124,7 @@ def _paired(tree: Tree) -> Tree:
 
 
 def _complete(sources: list[_Source]) -> list[str]:
-    """The groups that each hold a torque, a speed and a pressure: tests of their own."""
+    """The groups that each hold a torque, a speed and a pressure, so that each is a test of its own."""
     channels_by_group: dict[str, set[str | None]] = {}
     for source in sources:
         channels_by_group.setdefault(source.column.group, set()).add(known_channel(source.column.name))
@@ -131,7 +132,8 @@ def _complete(sources: list[_Source]) -> list[str]:
 
 
 def _sources(tree: Tree, group: str, depth: int, above: Tree, stamps: Stamps) -> Iterator[_Source]:
-    """The columns of a folder and of those in it; `above` is what the folders above state, `stamps` has the first start."""
+    """The columns of a folder and its subfolders; `above`: values stated in the folders above; `stamps`: holds the
+    first start."""
     stated = {**above, **_scalars(tree), **{key: node for key, node in tree.items() if key.lower() in UNITS}}
     for name, node in tree.items():
         path = f"{group}/{name}" if group else name
@@ -188,7 +190,7 @@ def _columns(name: str, leaf: Leaf, group: str, beside: Tree, stamps: Stamps) ->
 
 
 def _referred(leaf: Leaf, rows: int, stamps: Stamps) -> Clock | None:
-    """The clock of an array that refers to an array of times, in a unit of time; one may state since when they count."""
+    """The clock of an array that refers to an array of times in a unit of time, which may state an origin."""
     times = leaf.times
     unit = "" if times is None else unit_of_array(times.attributes)
     converted = conversion("time_s", unit) if unit else None
@@ -207,14 +209,15 @@ def _referred(leaf: Leaf, rows: int, stamps: Stamps) -> Clock | None:
 
 
 def _unit(names: Sequence[str], attributes: Tree, beside: Tree, *, whole: bool) -> str:
-    """The unit that stands at an array or beside it under one of its names; `whole`: or without any, as it is one column."""
+    """The unit stated at an array, or beside it under one of its names; `whole`: the array is one column, so a unit
+    without a name counts too."""
     at_data = beside if whole and any(key.lower() in VALUE_NAMES for key in beside) else {}
     named = (stated_unit(name, stated) for stated in (attributes, beside) for name in names)
     return next(filter(None, [unit_of_array(attributes if whole else {}), *named, unit_of_array(at_data)]), "")
 
 
 def unit_of_array(held: Tree) -> str:
-    """The unit among what is stated of one array."""
+    """The unit among the values stated about one array."""
     lowered = {key.lower(): value for key, value in held.items()}
     return next(filter(None, (_text(lowered.get(key)) for key in UNITS)), "")
 
@@ -224,14 +227,14 @@ def _count_units(texts: list[str]) -> int:
 
 
 def parsed(value: Any) -> Any:
-    """What a text holds as JSON; the value itself where it is none."""
+    """The value of a JSON text; any other value or text unchanged."""
     with contextlib.suppress(ValueError):
         return json.loads(value) if isinstance(value, str) else value
     return value
 
 
 def stated_unit(name: str, beside: Tree) -> str | None:
-    """The unit of a column among what stands beside it: as `torque_unit`, or under `units` by its name."""
+    """The unit of a column among values stored beside it: as `torque_unit`, or by the column's name under `units`."""
     lowered = {key.lower(): value for key, value in beside.items()}
     for key in UNITS:
         by_name = parsed(lowered.get(key))
@@ -249,7 +252,8 @@ def _rows(leaf: Leaf) -> int:
 
 
 def _scalars(tree: Tree) -> dict[str, float | str]:
-    """The single numbers and texts of a folder, and of folders in it that hold nothing else; a number's unit beside it."""
+    """The single numbers and texts of a folder, and of subfolders with nothing else; a number's unit is stored beside
+    it."""
     scalars: dict[str, float | str] = {}
     for key, value in tree.items():
         number = _number(value)
@@ -289,7 +293,7 @@ def _texts(value: Any) -> list[str]:
 
 
 def refuse_counts(shown: str, values: NDArray[Any], stated: Mapping[str, Any]) -> None:
-    """Raise InvalidError on whole numbers beside a factor, which may be raw counts or values that it was applied to."""
+    """Raise InvalidError on integers beside a factor: they may be raw counts, or values to which it is already applied."""
     for name, value in stated.items() if values.dtype.kind in "iu" else ():
         words, number = set(re.split(r"[\W_]+|(?<=[a-z])(?=[A-Z])", name)), _number(value)
         words = {word.lower() for word in words}
@@ -303,7 +307,7 @@ def refuse_counts(shown: str, values: NDArray[Any], stated: Mapping[str, Any]) -
 
 
 def _values(source: _Source) -> NDArray[Any]:
-    """The values, scaled as NetCDF's conventions say; values that stand for none are masked.
+    """The values, scaled by NetCDF's conventions; fill values are masked.
 
     Source: CF Conventions, 8.1, packed data.
     """

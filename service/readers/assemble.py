@@ -70,8 +70,8 @@ _MAX_NAMED = 20
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Channels:
-    """Channels [n] by public name in their units. `counts`: the time may be a recorder's default that counts samples;
-    `labels`: words above the table -> what stands beside them."""
+    """Channels [n] by public name in their units. `counts`: the time may be a recorder's default that only counts
+    samples; `labels`: words above the table -> the text beside them."""
 
     columns: dict[str, FloatArray]
     notices: tuple[Notice, ...] = ()
@@ -81,7 +81,7 @@ class Channels:
 
 @dataclass(slots=True)
 class _Series:
-    """A channel: its values, its times (None: none stated), which samples are valid, and whose times they are."""
+    """A channel: its values, its times (None: none stated), which samples are valid, and the name of its clock."""
 
     values: FloatArray
     valid: NDArray[np.bool_] | None
@@ -90,10 +90,10 @@ class _Series:
 
 
 def to_channels(table: Table, reading: Reading, limits: Limits) -> Channels:
-    """The channels that the names and `reading` choose.
+    """The channels chosen by their names and `reading`.
 
-    Raises InvalidError where a unit or a clock is not clear, a value is no number, or nothing is known; TooLargeError on too
-    many values.
+    Raises InvalidError if a unit or a clock is ambiguous, a value is no number, or no channel is known; TooLargeError
+    on too many values.
     """
     if table.parts:
         return below_each_other([to_channels(part, reading, limits) for part in _parts(table)])
@@ -127,13 +127,13 @@ def to_channels(table: Table, reading: Reading, limits: Limits) -> Channels:
 
 
 def _parts(table: Table) -> list[Table]:
-    """The parts of a file, each without the others."""
+    """The parts of a file, each as a table of its own."""
     return [replace(part, parts=()) for part in table.parts]
 
 
 def below_each_other(parts: Sequence[Channels]) -> Channels:
-    """The channels of a file's parts as one: those that all have, with times that go on. Raises InvalidError where they
-    have none in common."""
+    """The parts' common channels appended one after the other, with continued times. Raises InvalidError if the parts
+    have no channels in common."""
     names = [name for name in (parts[0].columns if parts else ()) if all(name in part.columns for part in parts)]
     columns = {name: np.concatenate([part.columns[name] for part in parts]) for name in names}
     if not columns:
@@ -148,7 +148,7 @@ def below_each_other(parts: Sequence[Channels]) -> Channels:
 
 
 def _continued(times: FloatArray) -> FloatArray:
-    """Times [n] that begin again with each part of a file, as those of one record."""
+    """Times [n] that restart with each part of a file, continued as those of one record."""
     steps = np.diff(times)
     back = steps < 0
     usual = float(np.median(steps[~back])) if not back.all() else 1.0
@@ -157,7 +157,7 @@ def _continued(times: FloatArray) -> FloatArray:
 
 
 def _refuse_standing(columns: Mapping[str, FloatArray]) -> None:
-    """Raise InvalidError where the time stays as it is from row to row: a clock that is coarser than the rows is none."""
+    """Raise InvalidError if the time stays the same from row to row: a clock coarser than the rows is no clock."""
     time_s = columns.get("time_s")
     if time_s is None or len(columns) == 1 or not stands(time_s):
         return
@@ -197,8 +197,8 @@ def _chosen_table(columns: dict[str, FloatArray], table: Table, reading: Reading
 def _clocks(
     columns: Sequence[FileColumn], taken: Sequence[Taken], values: Mapping[int, FloatArray]
 ) -> dict[int, Clock | None]:
-    """The clock of each column that is taken and is no time: the one that the file states for it, a column of times, its
-    recorder's, or none."""
+    """The clock of each column taken that is no time itself: the one stated for it, a column of times, its recorder's,
+    or none."""
     all_times = {column.index: _column_clock(columns, column, values) for column in taken if column.channel == "time_s"}
     named = {at: column.index for column in taken for at in column.clock_of}
     times = {at: clock for at, clock in all_times.items() if at not in named.values()} or all_times
@@ -236,8 +236,8 @@ def _clocks(
 
 
 def _may_be_clocks(table: Table, channels: Mapping[int, str], reading: Reading) -> list[int]:
-    """The columns that may be the time of a channel, or of all where no column is the time; none where the caller named
-    one."""
+    """The columns that may be the time of a channel, or of all channels if no column is the time; empty if the caller
+    named one."""
     if reading.time == NO_TIME or reading.only_named or "time_s" in choices_of(reading):
         return []
     others = [(at, own) for at, own in enumerate(table.columns) if at not in channels]
@@ -248,7 +248,7 @@ def _may_be_clocks(table: Table, channels: Mapping[int, str], reading: Reading) 
 
 
 def as_seconds(column: FileColumn, values: NDArray[Any]) -> FloatArray:
-    """A column that may be the time, in s; one without a unit as it is."""
+    """A possible time column in s; one without a unit unchanged."""
     if values.dtype.kind in "Mm":
         return np.asarray((values - values[:1]) / _SECOND, dtype=np.float64)
     converted = conversion("time_s", column.unit or "s")
@@ -256,14 +256,14 @@ def as_seconds(column: FileColumn, values: NDArray[Any]) -> FloatArray:
 
 
 def _repeats(times: FloatArray) -> bool:
-    """Whether any time stands in more than one row."""
+    """Whether any time occurs in more than one row."""
     steps = np.diff(times)
     return not (steps > 0).all() and np.unique(times).size < times.size
 
 
 def _refuse_passed_over(column: FileColumn, seconds: FloatArray, clocks: Mapping[int, Clock | None]) -> None:
-    """Raise InvalidError where a column that may be the time runs on and there is no other clock; or where it runs like a
-    clock that is used, and begins within its record at another time: it may be that of a channel."""
+    """Raise InvalidError if an unused column may be a time: it runs on and there is no other clock, or it runs like a
+    used clock and begins within its record at another time, so that it may belong to a channel."""
     if not any(clocks.values()) and runs_on(seconds):
         raise perhaps_the_time(column)
     all_used = [clock.read() for clock in {id(own): own for own in clocks.values() if own is not None}.values()]
@@ -286,7 +286,7 @@ def _column_clock(columns: Sequence[FileColumn], column: Taken, values: Mapping[
 
 
 def _agree(times: FloatArray, others: FloatArray) -> bool:
-    """Whether two columns tell the same time since their beginning, within the resolution of the coarser."""
+    """Whether two columns show the same elapsed time, within the resolution of the coarser one."""
     if times.size != others.size:
         return False
     steps = [step[step > 0].min(initial=np.inf) for step in (np.diff(times), np.diff(others))]
@@ -295,13 +295,15 @@ def _agree(times: FloatArray, others: FloatArray) -> bool:
 
 
 def runs_on(times: FloatArray) -> bool:
-    """Whether a column may be a clock: nine of ten of its steps go on. Chosen: of durations in any order half do."""
+    """Whether a column may be a clock: nine of ten of its steps are forward. Chosen: of durations in any order half
+    are."""
     steps = np.diff(times[~np.isnan(times)])
     return bool(steps.size > 0 and np.count_nonzero(steps > 0) >= _MOST_OF * steps.size)
 
 
 def _add_part(times: FloatArray, parts: Mapping[int, FloatArray]) -> int | None:
-    """Add to times in whole seconds, in place, the part of the second that stands in a column of its own: which one."""
+    """Add the fraction of the second, from a column of its own, to times in whole seconds, in place; returns that
+    column."""
     for at, seconds in parts.items() if stands(times) else ():
         if ((seconds >= 0) & (seconds < 1)).all() and (np.diff(times + seconds) > 0).all():
             times += seconds - seconds[0]
@@ -312,8 +314,8 @@ def _add_part(times: FloatArray, parts: Mapping[int, FloatArray]) -> int | None:
 def _read(
     table: Table, chosen: Sequence[Taken], reading: Reading, limits: Limits
 ) -> tuple[dict[str, _Series], Table, bool]:
-    """The channels' values and times, the table without totals at its end, with notices, and whether their one clock may
-    only count."""
+    """The channels' values and times, without totals at the table's end, with notices, and whether the only clock may
+    just count samples."""
     indices = [column.index for column in chosen]
     stated = sum(table.columns[index].rows or 0 for index in indices)
     if stated > limits.most_values:
@@ -407,14 +409,15 @@ def _drop_empty_rows(name: str, own: _Series, table: Table, leave_out: bool) -> 
 
 
 def _is_held(missing: NDArray[np.bool_]) -> bool:
-    """Whether a channel with so many empty cells [n] may hold its last value there: it has few values, or none for long."""
+    """Whether a channel with this many empty cells [n] may hold its last value in them: it has few values, or none for
+    long."""
     filled = np.flatnonzero(~missing)
     apart = np.diff([*filled, missing.size])
     return bool(filled.size < _FEW or apart.max() > _LONGEST_PAUSE * np.median(apart))
 
 
 def _which_is_empty(name: str, missing: NDArray[np.bool_], line_of: LineOf | None) -> InvalidError:
-    """The error of a channel that has a value in some rows only."""
+    """The error for a channel with values in only some rows."""
     row = int(missing.argmax())
     message = (
         f"{place(name, row, line_of)} is empty, as in {np.count_nonzero(missing)} of {missing.size} rows. If an empty cell "
@@ -425,7 +428,7 @@ def _which_is_empty(name: str, missing: NDArray[np.bool_], line_of: LineOf | Non
 
 
 def _numbers(column: Taken, values: NDArray[Any], start: Any) -> tuple[FloatArray, NDArray[np.bool_] | None]:
-    """Values in the channel's unit and which of them are valid; points in time as seconds since `start`.
+    """Values in the channel's unit, and which of them are valid; points in time as seconds since `start`.
 
     Raises InvalidError on any other type.
     """
@@ -445,8 +448,8 @@ def _numbers(column: Taken, values: NDArray[Any], start: Any) -> tuple[FloatArra
 
 
 def _in_seconds(column: FileColumn, times: FloatArray, reading: Reading) -> list[Notice]:
-    """Scale times without a unit that only as one of a computer's counts are of our time, in place, from the first on, and
-    say so.
+    """Convert times without a unit to seconds from the first, in place, if they are present-day dates only in one of a
+    computer's units; returns the notice.
 
     Raises InvalidError where no map takes them for seconds, or where they may be days as spreadsheets or MATLAB count them:
     of our time since 1900 or the year 0, less than five of them, in steps that would be shorter than a rig samples.
@@ -492,7 +495,7 @@ def _left_out(columns: Mapping[int, FileColumn], taken: Sequence[Taken], reading
 
 
 def _on_one_clock(series: Mapping[str, _Series], notices: list[Notice]) -> dict[str, FloatArray]:
-    """The channels with one `time_s` where they have times; invalid samples left out."""
+    """The channels resampled on one `time_s`, if they have times, without invalid samples."""
     if "time_s" in series:
         return {"time_s": series["time_s"].values}
     leading = next((name for name in _LEADING if name in series), next(iter(series)))
@@ -540,7 +543,8 @@ def _same_clock(series: _Series, other: _Series) -> bool:
 def _resampled(
     name: str, own: _Series, lead: _Series
 ) -> tuple[FloatArray, NDArray[np.bool_] | None, NDArray[np.bool_]]:
-    """A channel at the leading channel's times, straight between its samples: values, which are valid, which lie inside."""
+    """A channel linearly interpolated at the leading channel's times: values, which are valid, and which lie within its
+    record."""
     assert own.times is not None  # noqa: S101 (seen to by the caller)
     assert lead.times is not None  # noqa: S101
     if own.times.size == 0 or not (np.diff(own.times) > 0).all():
@@ -557,7 +561,7 @@ def _resampled(
 
 
 def _step(times: FloatArray) -> float:
-    """How far apart samples are [s]."""
+    """The distance between samples [s]."""
     return float(np.median(np.diff(times))) if times.size > 1 else 0.0
 
 

@@ -36,10 +36,10 @@ _MAX_NAMED = 10
 
 @dataclass(frozen=True, slots=True)
 class Taken:
-    """A column that is taken: the file's `index`-th as `channel`, with its conversion to the channel's unit.
+    """A column taken as a channel: the file's `index`-th as `channel`, with its conversion to the channel's unit.
 
-    `unit`: the one that file or caller states; None: neither does, and the channel's own was taken. `clock_of`: the columns
-    of which alone it is the time, as it names them (`t_M`).
+    `unit`: as stated by file or caller; None: not stated, so the channel's own is assumed. `clock_of`: the only columns
+    of which it is the time, by the names it gives them (`t_M`).
     """
 
     channel: str
@@ -79,7 +79,7 @@ def is_time(column: FileColumn) -> bool:
 
 
 def part_of_second(column: FileColumn) -> float | None:
-    """The factor to s of a column beside the time that may hold the part of the second: its title is a unit, or says so."""
+    """The factor to s of a column beside the time that may hold the fraction of the second, by its title."""
     unit = conversion("time_s", column.unit or column.name)
     return unit.factor if unit and unit.factor < 1 else 1.0 if _PART_OF_SECOND.search(column.name) else None
 
@@ -90,10 +90,11 @@ def is_counter(column: FileColumn) -> bool:
 
 
 def column_of(text: str, unit: str | None = None, group: str = "", *, moments: bool = False) -> FileColumn:
-    """A column's title -> name and unit: `torque [Nm]`, `torque (Nm)`, `M / Nm`, `Druck in bar`, `Time, ms`, `speed_rad_s`.
+    """The name and unit in a column's title: `torque [Nm]`, `torque (Nm)`, `M / Nm`, `Druck in bar`, `Time, ms`,
+    `speed_rad_s`.
 
-    `unit` is what the file states beside the title; points in time (`moments`) need none. Raises InvalidError on a text
-    that is too long for a title, and where the title states another unit.
+    `unit` is the unit stated beside the title; points in time (`moments`) need none. Raises InvalidError on a text too
+    long for a title, and if the title states another unit.
     """
     title = text.strip()
     if len(title) > LONGEST_TITLE:
@@ -131,7 +132,7 @@ def _taken_apart(title: str) -> tuple[str, str | None]:
 
 
 def bare_unit(text: str) -> str | None:
-    """A unit without its brackets and the range of its sensor (`0..10 bar`, `±200 Nm`); None where nothing is stated."""
+    """A unit without its brackets and the range of its sensor (`0..10 bar`, `±200 Nm`); None if none is stated."""
     unit = text.translate(_WIDE).strip()
     unit = (unit[1:-1] if unit[:1] + unit[-1:] in ("[]", "()", "{}", "<>") else unit).strip().removeprefix("in ")
     within = _RANGE.match(unit)
@@ -141,7 +142,7 @@ def bare_unit(text: str) -> str | None:
 
 
 def with_unit(column: FileColumn, unit: str | None) -> FileColumn:
-    """A column with the unit that the file states beside the name; raises InvalidError where the name states another."""
+    """A column with the unit stated beside its name; raises InvalidError if the name states another."""
     stated = bare_unit(unit or "")
     if stated and column.unit and is_unit(stated) and not is_unit(column.unit):
         return replace(column, name=column.title, unit=stated)  # `Torque (filtered)` is no unit
@@ -155,9 +156,10 @@ def with_unit(column: FileColumn, unit: str | None) -> FileColumn:
 
 
 def parse_map(mapping: str | None) -> dict[str, ColumnChoice]:
-    """`torque_nm:Mz,pressure_bar:p1` -> {channel: its column}. Names may hold commas and colons themselves.
+    """The dictionary channel -> column of a map given as text (`torque_nm:Mz,pressure_bar:p1`). Names may hold commas
+    and colons themselves.
 
-    Raises InvalidError where the text is no such list, or a channel in it is unknown or named twice.
+    Raises InvalidError if the text is no such list, or a channel in it is unknown or named twice.
     """
     if mapping is None or not mapping.strip():
         return {}
@@ -186,7 +188,7 @@ def _wrong_map(value: str, rule: str) -> InvalidError:
 
 
 def choices_of(reading: Reading) -> dict[str, ColumnChoice]:
-    """The columns that a caller names, the time column among them."""
+    """The columns named by the caller, including the time column."""
     named = dict(reading.mapping)
     if reading.time and reading.time != NO_TIME:
         named.setdefault("time_s", ColumnChoice(column=reading.time))
@@ -194,12 +196,12 @@ def choices_of(reading: Reading) -> dict[str, ColumnChoice]:
 
 
 def named_columns(reading: Reading) -> list[str]:
-    """The titles that a caller names."""
+    """The titles named by the caller."""
     return [choice.column for choice in choices_of(reading).values()]
 
 
 def recognised(titles: Sequence[str], named: Sequence[str]) -> int:
-    """How many titles are those of channels or are `named`: by it the row of titles is found."""
+    """The number of titles that name channels or are in `named`, by which the row of titles is found."""
     wanted_keys = {key(name) for name in named} | {key(column_of(name).name) for name in named}
     channels: set[str] = set()
     for title in titles:
@@ -214,7 +216,8 @@ def recognised(titles: Sequence[str], named: Sequence[str]) -> int:
 
 
 def choose(columns: Sequence[FileColumn], reading: Reading) -> list[Taken]:
-    """Which columns are taken, in the order of the file; all others are left out. The time may be taken several times.
+    """The columns to read as channels, in the order of the file; all others are left out. The time may be taken several
+    times.
 
     Raises InvalidError where two columns are the same channel, or a unit is unknown or not stated.
     """
@@ -229,7 +232,7 @@ def choose(columns: Sequence[FileColumn], reading: Reading) -> list[Taken]:
 
 
 def understood(columns: Sequence[FileColumn], reading: Reading) -> tuple[list[Taken], list[InvalidError]]:
-    """The columns that are channels, in the order of the file, and what keeps them from being read."""
+    """The columns that are channels, in the order of the file, and the errors that prevent reading them."""
     named, errors = choices_of(reading), []
     if reading.time == NO_TIME:
         named.pop("time_s", None)
@@ -288,7 +291,7 @@ def understood(columns: Sequence[FileColumn], reading: Reading) -> tuple[list[Ta
 
 
 def _clocks_by_name(columns: Sequence[FileColumn]) -> dict[int, frozenset[int]]:
-    """The columns of times that name other columns, and the ones that they name: `t_M` M, `Zeit Moment` the torque's."""
+    """Columns of times that name other columns, with the names: `t_M` names M, `Zeit Moment` the torque."""
     found: dict[int, frozenset[int]] = {}
     for at, column in enumerate(columns):
         all_words = words(column.name[:LONGEST_NAME], digits=True)
@@ -314,7 +317,7 @@ def _clocks_by_name(columns: Sequence[FileColumn]) -> dict[int, frozenset[int]]:
 
 
 def may_be_time(column: FileColumn) -> bool:
-    """Whether a column that is in a unit of time may be the clock, if its values run on as one."""
+    """Whether a column in a unit of time may be the clock, provided that its values run on."""
     return meaning(column.name, column.unit)[1] is Sense.UNKNOWN and measures("time_s", column.unit)
 
 
@@ -327,7 +330,7 @@ def like_a_time(column: FileColumn) -> bool:
 
 
 def no_unit(columns: Sequence[tuple[str, FileColumn]], reading: Reading) -> InvalidError:
-    """The error of columns that state no unit. It ends with the `map=` to add if all of them are in their channels' own
+    """The error for columns without a unit. It ends with the `map=` to add if all of them are in their channels' own
     units."""
     errors = []
     for channel, column in columns:
@@ -344,8 +347,8 @@ def no_unit(columns: Sequence[tuple[str, FileColumn]], reading: Reading) -> Inva
 
 
 def _find(columns: Sequence[FileColumn], channel: str, name: str) -> int:
-    """The index of the column that a map names: by its exact title or name, by both name and unit, or by its number among
-    equal ones (`M#2`), else whatever its case, blanks and unit."""
+    """The index of the column named in a map: by its exact title or name, by name and unit, or by its number among
+    equal ones (`M#2`); failing that, ignoring case, blanks and unit."""
     wanted = key(column_of(name).name)
     forms = [(own.title, own.name, f"{own.group}/{own.name}", f"{own.name} [{own.unit}]") for own in columns]
     exact = [index for index, names in enumerate(forms) if name in names]
@@ -377,13 +380,13 @@ def _twice(channel: str, *columns: FileColumn) -> InvalidError:
 
 
 def several_times(shown: str) -> InvalidError:
-    """The error of times in several columns."""
+    """The error for times in several columns."""
     message = f"time_s must be one column, got {shown}; choose one with time=NAME"
     return InvalidError.of(message, code="ambiguous", pointer="/time")
 
 
 def perhaps_the_time(column: FileColumn) -> InvalidError:
-    """The error of a column that may be the time, where nothing else is."""
+    """The error for a column that may be the time, if no other is."""
     title = column.title or column.shown()
     message = f"{title} may be the time: add time={title} if it is; if each row is a plateau, add time={NO_TIME}"
     return InvalidError.of(message, code="perhaps_the_time", pointer="/time", value=title)
@@ -395,7 +398,7 @@ def _list(columns: Sequence[FileColumn]) -> str:
 
 
 def unit_in_title(channel: str, title: str) -> str | None:
-    """The unit of the channel that a title ends in, whatever parts them: `Time, ms`, `Mz_kNm`, `timeMs`, `Time..ms.`."""
+    """The channel's unit at the end of a title, after any separator: `Time, ms`, `Mz_kNm`, `timeMs`, `Time..ms.`."""
     if len(title) > LONGEST_NAME:
         return None
     words = [title[start.start() :].strip(" .:,;_-()[]") for start in _WORD_STARTS.finditer(title)]
@@ -403,7 +406,8 @@ def unit_in_title(channel: str, title: str) -> str | None:
 
 
 def _may_state(channel: str, title: str) -> str | None:
-    """A word within a title that is another unit than the channel's own (`Mz [kNm] filtered`); None where there is none."""
+    """A word in a title that may be another unit of the channel than its own (`Mz [kNm] filtered`); None if there is
+    none."""
     for word in re.finditer(r"[^\W\d_]{2,}(?:/[^\W\d_]+)?", title[:LONGEST_NAME]):
         for part in (word[0], word[0][-3:]):
             converted = conversion(channel, part)
@@ -413,7 +417,7 @@ def _may_state(channel: str, title: str) -> str | None:
 
 
 def _unit(channel: str, column: FileColumn, choice: ColumnChoice | None) -> str | None:
-    """The unit that the file, the map or the profile states; None where none does.
+    """The unit stated by the file, the map or the profile; None if none states it.
 
     A column that a map names may end in its unit, whatever parts them. Where a title says that its values are scaled, only
     the map says how.

@@ -71,7 +71,7 @@ _SYSTEM = (
 
 
 def missing() -> list[str]:
-    """What this system cannot keep from a process that reads a file, a phrase each; empty where it can all."""
+    """Phrases on the protections that this system lacks for a process reading a file; empty if it has all."""
     phrases = []
     if _landlock_version() < 1:
         phrases.append("other files (Landlock is missing)")
@@ -81,7 +81,7 @@ def missing() -> list[str]:
 
 
 def close_files(*, readable: Sequence[Path], writable: Sequence[Path]) -> None:
-    """From now on this thread, and those that it starts, can open the system's libraries, our code and these paths only.
+    """Restrict this thread, and threads it starts, to opening the system's libraries, our code and these paths.
 
     Does nothing where the system has no Landlock.
     """
@@ -114,8 +114,8 @@ def close_files(*, readable: Sequence[Path], writable: Sequence[Path]) -> None:
 
 
 def close_network_and_processes() -> None:
-    """From now on no thread of this process can open a socket, start a process, or look into another or end it, nor change
-    who may read a file.
+    """Forbid all threads of this process to open sockets, start, inspect or end processes, or change a file's
+    permissions.
 
     Does nothing where the system has no seccomp.
     """
@@ -144,12 +144,13 @@ def close_network_and_processes() -> None:
 
 
 def _line(code: int, value: int, if_true: int = 0, if_false: int = 0) -> bytes:
-    """An instruction of the filter: `code`, how many lines to skip where it holds and where it does not, its value."""
+    """An instruction of the filter: `code`, the numbers of lines to skip if it is true and if it is false, and its
+    value."""
     return struct.pack("=HBBI", code, if_true, if_false, value)
 
 
 def _allow(ruleset: int, path: Path, rights: int) -> None:
-    """Allow these rights over a file, or over all below a folder; what is not there needs no rule."""
+    """Allow these rights on a file, or on everything below a folder; a missing path needs no rule."""
     try:
         opened = os.open(path, os.O_PATH | os.O_CLOEXEC)
     except OSError:
@@ -162,14 +163,15 @@ def _allow(ruleset: int, path: Path, rights: int) -> None:
 
 
 def _landlock_version() -> int:
-    """The version of Landlock that the kernel has, below 1 where it has none."""
+    """The kernel's version of Landlock, below 1 without it."""
     if not sys.platform.startswith("linux"):
         return 0
     return int(_libc.syscall(_CREATE_RULESET, None, ctypes.c_size_t(0), _VERSION_FLAG))
 
 
 def _has_seccomp() -> bool:
-    """Whether the kernel takes filters; it is asked for one at no address, which is a fault and not an unknown call."""
+    """Whether the kernel supports seccomp filters; it is tested with a null address, which gives a fault if they are
+    supported."""
     if not sys.platform.startswith("linux") or platform.machine() not in _ARCHITECTURES:
         return False
     return bool(_libc.prctl(_SET_SECCOMP, _FILTER, None, 0, 0) == -1 and ctypes.get_errno() == errno.EFAULT)

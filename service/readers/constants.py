@@ -34,9 +34,9 @@ _WITHIN = re.compile(
 
 
 def constants(table: Table, reading: Reading) -> dict[str, float]:
-    """The channels that are constant in the whole table by the caller's word, in their units; of a file in parts none.
+    """The constant channels stated by the caller, in their units; empty for a file in parts.
 
-    Raises InvalidError where a value or its unit is not clear.
+    Raises InvalidError if a value or its unit is ambiguous.
     """
     if reading.reads_all():
         return {}
@@ -65,7 +65,7 @@ def stated_step(table: Table, reading: Reading) -> float | None:
 
 
 def with_constants(table: Table, reading: Reading) -> Table:
-    """The table with a column for each channel that is constant in each of its blocks, for a file that is read in parts.
+    """The table with an added column for each channel that is constant in each of its blocks, for a file read in parts.
 
     A value is what the caller states, or stands in the lines above each block, or with `=sheets` in the table's name.
     Raises InvalidError, once it is read, where a value or its unit is not clear.
@@ -93,7 +93,7 @@ def with_constants(table: Table, reading: Reading) -> Table:
 
 
 def _value_of(channel: str, choice: ColumnChoice, name: str, head: Sequence[Sequence[str]]) -> float:
-    """A channel's value in one block, by the lines above it."""
+    """The channel's value in one block, from the lines above it."""
     if choice.column != SHEETS:
         return _value(channel, replace(choice, factor=1.0, offset=0.0), labels(head))
     value = value_of_part(name, head, channel)
@@ -105,7 +105,7 @@ def _value_of(channel: str, choice: ColumnChoice, name: str, head: Sequence[Sequ
 
 
 def value_of_part(name: str, head: Sequence[Sequence[str]], channel: str) -> float | None:
-    """A value of a channel that the name of a part of a file states, or else the lines above it, the nearest first."""
+    """A channel's value stated by the name of a part of a file, else by the nearest line above it."""
     for text in (name.replace("_", " "), *(" ".join(filter(None, row)) for row in reversed(head))):
         if held := value_within(text, channel):
             return held[0]
@@ -113,7 +113,7 @@ def value_of_part(name: str, head: Sequence[Sequence[str]], channel: str) -> flo
 
 
 def in_parts(tables: Sequence[Table]) -> Table:
-    """Tables of one file as one that is read in parts: those with the titles that most of them have."""
+    """One table of several parts: the tables of a file that share the most frequent titles."""
     titles = [tuple(column.name for column in table.columns) for table in tables]
     usual = Counter(titles).most_common(1)[0][0]
     parts = [table for table, own in zip(tables, titles, strict=True) if own == usual]
@@ -156,7 +156,7 @@ def _named_by_part(column: FileColumn, part: str) -> FileColumn:
 
 
 def _value(channel: str, choice: ColumnChoice, stated: Mapping[str, str]) -> float:
-    """A channel's value as the caller has it, or as it is stated beside the label that the caller names."""
+    """A constant channel's value as stated by the caller, or beside the label that the caller names."""
     text, unit = _stated_text(channel, choice, stated)
     match = _NUMBER.fullmatch(text)
     unit = unit or (match["unit"] if match else None) or CHANNELS[channel].unit
@@ -172,7 +172,7 @@ def _value(channel: str, choice: ColumnChoice, stated: Mapping[str, str]) -> flo
 
 
 def _stated_text(channel: str, choice: ColumnChoice, stated: Mapping[str, str]) -> tuple[str, str | None]:
-    """What the caller has for a value, or stands beside the label that the caller names; and the unit beside it."""
+    """The text of a stated value and its unit, by the caller or beside the label that the caller names."""
     text, unit = choice.column[1:].strip(), choice.unit
     if not _NUMBER.fullmatch(text):
         texts = {label.rstrip(":= ").casefold(): (label, cell) for label, cell in stated.items()}
@@ -189,8 +189,8 @@ def _stated_text(channel: str, choice: ColumnChoice, stated: Mapping[str, str]) 
 
 
 def value_within(text: str, channel: str) -> tuple[float, str] | None:
-    """A value of a channel that a title or a sheet's name states, in the channel's unit, and the text without it; None where
-    it states none, or several."""
+    """The channel's value stated in a title or a sheet's name, in the channel's unit, and the text without it; None if
+    there is none, or several."""
     found = []
     for match in _WITHIN.finditer(text[:MAX_QUOTED]):
         if converted := conversion(channel, match["unit"]):
@@ -201,10 +201,10 @@ def value_within(text: str, channel: str) -> tuple[float, str] | None:
 
 
 def stacked_columns(table: Table, reading: Reading) -> Table:
-    """The table with a part for each value that its titles state of a channel, one below the other; the table itself
-    where the caller does not ask for it.
+    """The table with one part for each value of a channel stated in its titles, one below the other; the table itself
+    if the caller does not request it.
 
-    Raises InvalidError where the titles state no values, or not the same columns for each.
+    Raises InvalidError if the titles state no values, or not the same columns for each.
     """
     channel = next((name for name, choice in reading.mapping.items() if choice.column == COLUMNS), None)
     if channel is None:
@@ -253,8 +253,8 @@ def stacked_columns(table: Table, reading: Reading) -> Table:
 
 
 def value_of_column(column: FileColumn, channel: str, unit: str | None = None) -> tuple[float, str] | None:
-    """The value of a channel that a column's title or its group states, or is in the caller's `unit`, and what the column
-    holds by the rest of its title; None where it states none."""
+    """The channel's value stated by a column's title or group (a bare number counts in the caller's `unit`), and the
+    quantity in the rest of the title; None without a value."""
     if held := value_within(column.name, channel):
         return held[0], held[1] or CELLS
     if held := value_within(column.group, channel):
@@ -269,8 +269,8 @@ def value_of_column(column: FileColumn, channel: str, unit: str | None = None) -
 
 
 def _without_empty_end(part: dict[int, NDArray[Any]], shared: int) -> dict[int, NDArray[Any]]:
-    """Columns [n] by index without the rows at their end in which all but the `shared` ones are empty: a longer part stands
-    beside this one."""
+    """Columns [n] by index without the empty rows at their end, except for the `shared` ones: a part beside it is
+    longer."""
     own = [values for index, values in part.items() if index >= shared]
     filled = [at for at, row in enumerate(zip(*own, strict=True)) if any(not _is_empty(cell) for cell in row)]
     end = filled[-1] + 1 if filled else None

@@ -18,7 +18,7 @@ from service.readers.limits import Limits
 
 
 class Format(StrEnum):
-    """The formats that are read."""
+    """The supported file formats."""
 
     TEXT = "CSV"
     TDMS = "TDMS"
@@ -134,7 +134,7 @@ def is_packed(path: Path) -> bool:
 
 
 class _Unpacked:
-    """A gzip file being read, no further than the limits allow."""
+    """A gzip file being read, up to the limits."""
 
     def __init__(self, file: BinaryIO, size: int, limits: Limits) -> None:
         self._unpacking = gzip.GzipFile(fileobj=file)
@@ -156,7 +156,7 @@ class _Unpacked:
 
 
 def sniff(path: Path, filename: str, limits: Limits) -> Format:
-    """The format of a file, by content first. Raises InvalidError where it is another one."""
+    """The format of a file, by its content first. Raises InvalidError if it is not supported."""
     with opened(path, limits) as source:
         head = source.read(_HEAD)
     shown = repr(filename[-MAX_QUOTED:])
@@ -187,7 +187,7 @@ def sniff(path: Path, filename: str, limits: Limits) -> Format:
 
 
 def utf_16(head: bytes) -> str | None:
-    """The encoding of a text of two bytes a letter, by its byte order mark or the zeros in its first letters."""
+    """The encoding of a UTF-16 text, by its byte order mark or the zero bytes in its first characters."""
     if head.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         return "utf-16"
     even, odd = head[:512:2], head[1:512:2]
@@ -198,7 +198,7 @@ def utf_16(head: bytes) -> str | None:
 
 
 def _format_of_archive(path: Path) -> Format:
-    """A workbook or any other ZIP archive, by the names in it; what is packed with gzip besides is no archive here."""
+    """Whether a ZIP archive is a workbook or another archive, by the names in it."""
     try:
         with zipfile.ZipFile(path) as archive:
             names = archive.namelist()
@@ -209,7 +209,8 @@ def _format_of_archive(path: Path) -> Format:
 
 
 def check_archive(path: Path, limits: Limits) -> list[zipfile.ZipInfo]:
-    """The files of an archive that states to unpack to no more than the limits allow. Raises InvalidError, TooLargeError."""
+    """The files of an archive, whose stated unpacked size must be within the limits. Raises InvalidError,
+    TooLargeError."""
     try:
         with zipfile.ZipFile(path) as archive:
             listed = archive.infolist()
@@ -225,12 +226,12 @@ def check_archive(path: Path, limits: Limits) -> list[zipfile.ZipInfo]:
 
 
 def _max_unpacked_bytes(packed: int, limits: Limits) -> int:
-    """Bytes that a packed file of so many may unpack to."""
+    """The maximum unpacked size of a packed file of this size [bytes]."""
     return min(limits.most_bytes, max(limits.free_bytes, limits.most_ratio * packed))
 
 
 def members(path: Path, limits: Limits) -> list[str]:
-    """The names of the files in an archive that may be records."""
+    """The names of files in an archive that may be records."""
     # zipfile takes no empty name for a folder's
     listed = [info for info in check_archive(path, limits) if info.filename and not info.is_dir() and info.file_size]
     return [
@@ -244,7 +245,8 @@ def members(path: Path, limits: Limits) -> list[str]:
 
 @contextmanager
 def unpacked(path: Path, name: str, limits: Limits) -> Iterator[Path]:
-    """One file of an archive, beside it. Raises InvalidError where it is encrypted or damaged, else TooLargeError."""
+    """Context with one file of an archive, unpacked beside it. Raises InvalidError where it is encrypted or damaged,
+    else TooLargeError."""
     most = _max_unpacked_bytes(path.stat().st_size, limits)
     with tempfile.NamedTemporaryFile(dir=path.parent) as plain:
         try:
@@ -260,13 +262,13 @@ def unpacked(path: Path, name: str, limits: Limits) -> Iterator[Path]:
 
 
 def too_slow(kind: Format, limits: Limits) -> InvalidError:
-    """The error of a file that takes more of a processor's time than it may."""
+    """The error for a file that needs more processor time than allowed."""
     message = f"reading the {kind} file took more than {limits.seconds} s of processor time: send it in smaller parts"
     return InvalidError.of(message, code="too_slow")
 
 
 def overdue(kind: Format, limits: Limits) -> BusyError:
-    """The error of a file that was waited for too long, though its reader has not used the time that it may."""
+    """The error for a file whose reader took too long by the clock, without using its processor time."""
     return BusyError(
         f"the {kind} file was not read within {limits.wall_seconds} s, because the service is busy: send it again later"
     )

@@ -38,7 +38,7 @@ def _folder(group: h5py.Group, depth: int, left: list[int]) -> Tree:
 
 
 def _leaf(node: h5py.Dataset) -> Any:
-    """A data set as an array, or as the text that it holds."""
+    """A data set as an array, or as its text."""
     attributes = dict(node.attrs.items())
     if attributes.get("MATLAB_class") == b"char" and node.size < 1000:
         return "".join(map(chr, np.asarray(node).reshape(-1)))
@@ -51,7 +51,7 @@ def _leaf(node: h5py.Dataset) -> Any:
 
 
 def _times(node: h5py.Dataset) -> Leaf | None:
-    """The array that a data set refers to for its first dimension: a dimension scale, or as NetCDF's conventions name it.
+    """The array to which a data set refers for its first dimension: a dimension scale, or by NetCDF's conventions.
 
     Source: HDF5 Dimension Scale Specification; CF Conventions, 5, coordinate systems.
     """

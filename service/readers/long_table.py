@@ -51,17 +51,17 @@ _SECOND = np.timedelta64(1, "s")
 
 
 def says_valid(column: FileColumn, reading: Reading) -> bool:
-    """Whether a column says which rows are valid, by its title, and is to be looked at."""
+    """Whether a column's title says that it marks valid rows, so that its values are to be checked."""
     if reading.good == NO_MISSING or reading.missing == NO_MISSING:
         return False
     return _QUALITY.search(column.name) is not None or _STATUS.search(column.name) is not None
 
 
 def valid_rows(column: FileColumn, cells: NDArray[Any], reading: Reading) -> NDArray[np.bool_] | None:
-    """Which rows a column says to be valid [n]: by the caller's codes, in words, by OPC's codes, or by a flag whose title
-    says what it means; None where all rows have one value, or the column holds none of these.
+    """The valid rows [n] by a column's codes: the caller's codes, words, OPC's codes, or a flag with a title that
+    states its meaning; None if all rows have one value, or the column holds none of these.
 
-    Raises InvalidError where rows have different codes of a quality, of which nobody says which is good.
+    Raises InvalidError if rows have different quality codes and it is not stated which of them are good.
     """
     codes = np.array([_code(word) for word in _stripped(cells)], dtype=object)
     values = set(codes)
@@ -85,7 +85,7 @@ def valid_rows(column: FileColumn, cells: NDArray[Any], reading: Reading) -> NDA
 
 
 def _code(word: str) -> str | float:
-    """A code as a number where it is one, or a flag."""
+    """A code as a number or a flag if it is one, else as text."""
     word = word.casefold()
     return float(word) if NUMBER.fullmatch(word) else _FLAGS.get(word, word)
 
@@ -104,10 +104,10 @@ def _which_is_good(column: FileColumn, codes: NDArray[Any]) -> InvalidError:
 
 
 def widened(table: Table, reading: Reading) -> tuple[Table, Reading]:
-    """The table with a column for each name, every one with its own times, and how it is read then; the table itself where
-    it is of another form.
+    """The table in wide form, with a column and times for each name in a column of names, and the reading for it; a
+    table of another form unchanged.
 
-    Raises InvalidError where the column of values or of times is not clear, or a channel has several units.
+    Raises InvalidError if the column of values or of times is ambiguous, or a channel has several units.
     """
     columns = table.columns
     named = [choice.column for channel, choice in choices_of(reading).items() if channel != "time_s"]
@@ -160,7 +160,7 @@ def _stripped(cells: NDArray[Any]) -> NDArray[Any]:
 
 
 def _head(table: Table) -> dict[int, list[Any]]:
-    """The first cells that are not empty of each column."""
+    """The first non-empty cells of each column."""
     if table.head:
         width = range(len(table.columns))
         return {index: [row[index] for row in table.head if len(row) > index and row[index]] for index in width}
@@ -191,7 +191,7 @@ def _time(columns: Sequence[FileColumn], reading: Reading) -> tuple[int, Any] | 
 
 
 def _value(columns: Sequence[FileColumn], numeric: Sequence[int], names: int, reading: Reading) -> int:
-    """The column of values: the only one of numbers that is no time, or the one that is called so."""
+    """The column of values: the only numeric one that is no time, or the one named so."""
     timed = choices_of(reading).get("time_s")
     candidates = [index for index in numeric if not is_time(columns[index])]
     if timed is not None:

@@ -19,7 +19,7 @@ _INDEX, _OVER, _MORE = (
 
 
 def as_lines(text: str) -> str | None:
-    """The tables of a marked-up text as lines; None where it is another text."""
+    """The tables of an HTML or XML text as lines; None for any other text."""
     if not _BEGINNING.match(text) or not _ROW.search(text):
         return None
     rows: list[list[str]] = []

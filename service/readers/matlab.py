@@ -25,7 +25,7 @@ def read_table(path: Path, reading: Reading, limits: Limits) -> Table:
 
 
 def _node(value: Any) -> Any:
-    """A variable as a tree: structs are folders, arrays of structs folders of folders."""
+    """A variable as a tree: a struct is a folder, an array of structs a folder of folders."""
     if isinstance(value, mat_struct):
         return {name: _node(getattr(value, name)) for name in value._fieldnames}  # noqa: SLF001 (scipy documents it so)
     if isinstance(value, np.ndarray) and value.dtype == object and value.size and isinstance(value.flat[0], mat_struct):

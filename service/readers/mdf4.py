@@ -29,7 +29,7 @@ _NO_TIMES = (v4c.SYNC_TYPE_ANGLE, v4c.SYNC_TYPE_DISTANCE, v4c.SYNC_TYPE_INDEX)
 
 
 def read_table(path: Path, reading: Reading, limits: Limits) -> Table:
-    """The channels of all groups. A file that was not finalised is read as asammdf finalises a copy of it."""
+    """The channels of all groups. A file that was not finalised is finalised in a copy by asammdf."""
     with path.open("rb") as opened:
         head = opened.read(16)
     version = head[8:].decode("latin-1").strip("\0 ")
@@ -81,7 +81,8 @@ def _column(file: Any, group: int, index: int, several: bool, clocks: Mapping[in
 
 
 def _times(file: Any, group: int, clocks: Mapping[int, FloatArray]) -> FloatArray:
-    """The times of a group [n] s, those that came with its values. Raises InvalidError where their unit is not known."""
+    """The times of a group [n] s, from `clocks` if they were read with its values. Raises InvalidError if their unit is
+    unknown."""
     master = file.masters_db[group]
     _refuse_formula(file, group, master)
     unit = str(file.get_channel_unit(group=group, index=master) or "s")
@@ -91,8 +92,8 @@ def _times(file: Any, group: int, clocks: Mapping[int, FloatArray]) -> FloatArra
 
 
 def _values(file: Any, channels: Mapping[tuple[int, int], str], clocks: dict[int, FloatArray]) -> list[NDArray[Any]]:
-    """The physical values of channels by group and index, masked where their recorder marks them invalid; the groups' times
-    are put into `clocks`. Each group is gone through once."""
+    """The physical values of channels by group and index, masked if their recorder marks them invalid; the groups'
+    times are put into `clocks`. Each group is read once."""
     for group, index in channels:
         _refuse_formula(file, group, index)
     read = []
@@ -111,7 +112,7 @@ def _values(file: Any, channels: Mapping[tuple[int, int], str], clocks: dict[int
 
 
 def _refuse_formula(file: Any, group: int, index: int) -> None:
-    """Raise InvalidError where a formula in the file makes the values of a channel that is taken, or of its time.
+    """Raise InvalidError if the values of a channel to be read, or of its time, are computed by a formula in the file.
 
     asammdf has a formula computed by numexpr, by sympy as Python where that is installed, and gives raw counts where neither
     can: a file from outside decides neither what is run here nor what passes for a torque.
@@ -126,7 +127,7 @@ def _refuse_formula(file: Any, group: int, index: int) -> None:
 
 
 def _has_formula(conversion: Any, depth: int = 0) -> bool:
-    """Whether a conversion, or one that it refers to, is a formula; one that refers too deeply may be."""
+    """Whether a conversion, or one to which it refers, is or may be a formula; too deep references may be."""
     if conversion is None or isinstance(conversion, bytes):
         return False
     referenced = (conversion.referenced_blocks or {}).values()

@@ -26,7 +26,7 @@ _QUANTITY_NAMES = [name for name in _NAMES if name not in ("words", "run")]
 
 
 def _of(section: str, kind: str, tables: Sequence[_Words] = _TABLES) -> list[str]:
-    """The words of a kind, of both tables."""
+    """The words of a kind, from both tables."""
     return [word for table in tables for word in table.get(section, {}).get(kind, ())]
 
 
@@ -63,14 +63,14 @@ _FREQUENCY = re.compile("fr[eé]qu?[eu]|frecu|частота")
 
 
 class Sense(Enum):
-    """How a name is understood: wholly; wholly in another language; but for words that are not known; as another thing (a
-    set point, a limit); not."""
+    """How well a name is understood: entirely; entirely, in another language; in part; as another thing (a set point, a
+    limit); not."""
 
     WHOLE, FOREIGN, PART, OTHER, UNKNOWN = range(5)
 
 
 def key(name: str) -> str:
-    """Names that differ in case, blanks, dashes, width or in ö for oe are one name.
+    """A name in a form for comparison, without differences in case, blanks, dashes, width, or ö and oe.
 
     Composing letters takes time with the square of the length where accents are piled up: only short names are composed.
     """
@@ -131,7 +131,7 @@ def meaning(name: str, unit: str | None = None) -> tuple[str | None, Sense]:
 
 
 def words(name: str, *, digits: bool = False) -> list[str]:
-    """The words of a name in small letters, without labels that end in a number; or with them (`digits`)."""
+    """The words of a name in lower case, without labels that end in a number; or with them (`digits`)."""
     known_as = key(re.sub(r"(?<=[a-zäöüß])(?=[A-Z])", " ", name))
     if digits:
         return re.findall(r"[^\W_]+", known_as)
@@ -149,13 +149,13 @@ def has_noun(quantity: str, name: str) -> bool:
 
 
 def is_short_for(channel: str, name: str) -> bool:
-    """Whether a name is, or begins with, what rigs call a channel in few letters (`Mz`, `n1`, `p_2`)."""
+    """Whether a name is, or begins with, a usual short name of a channel (`Mz`, `n1`, `p_2`)."""
     first = next(iter(re.findall(r"[^\W\d_]+", key(name[:LONGEST_NAME]))), "")
     return first in _SHORT.get(channel, ())
 
 
 def label_of(what: str, stated: Iterable[str]) -> str | None:
-    """The label above a table beside which the run's `cycles` or its `clutch` stands; None where there is none."""
+    """The label above a table that has the run's `cycles` or its `clutch` beside it; None if there is none."""
     wanted = {key(label) for label in _of("run", what)}
     return next((label for label in stated if key(label.rstrip(":=. ")) in wanted), None)
 
@@ -171,11 +171,11 @@ def measures(quantity: str, unit: str | None) -> bool:
 
 
 def known_channel(name: str) -> str | None:
-    """The public channel that a name stands for in any language, whatever its unit, or None."""
+    """The public channel that a name stands for in any language, whatever its unit, else None."""
     channel, sense = meaning(name)
     return channel if sense in (Sense.WHOLE, Sense.FOREIGN) else None
 
 
 def is_another(name: str) -> bool:
-    """Whether a word of a name makes it another thing than what is measured at the clutch."""
+    """Whether a word of a name says that it is another quantity than one measured at the clutch."""
     return any(map(_OTHER.match, words(name[:LONGEST_NAME])))

@@ -68,8 +68,8 @@ _STATISTICS: dict[str, Callable[[FloatArray], float]] = {
 
 
 def mask_stated_marks(values: NDArray[Any], reading: Reading, channel: str) -> NDArray[Any]:
-    """Numbers [n], masked where they are one of the caller's marks, or NaN where there is any mark; where it is ABOVE, those
-    without a value have the one above them."""
+    """Numbers [n] with the caller's marks masked, and NaN too if any mark is given; with ABOVE a missing value is
+    replaced by the one above it."""
     if fills_down(reading.missing) and channel != "time_s":
         values = _filled_down(values)
     stated = marks(reading.missing, channel)
@@ -81,15 +81,15 @@ def mask_stated_marks(values: NDArray[Any], reading: Reading, channel: str) -> N
 
 
 def _filled_down(values: NDArray[Any]) -> NDArray[Any]:
-    """Values [n], each masked one as the last one above it that is not."""
+    """Values [n] with each masked value replaced by the last unmasked one above it."""
     gaps = np.ma.getmaskarray(values)
     last = np.maximum.accumulate(np.where(gaps, 0, np.arange(gaps.size)))
     return np.ma.MaskedArray(np.ma.getdata(values)[last], mask=gaps[last])
 
 
 def refuse_no_torque(columns: Mapping[str, FloatArray], line_of: LineOf | None, reading: Reading) -> None:
-    """Raise InvalidError where the torque is exactly zero in several rows that follow each other, at a pressure and a speed:
-    friction has a torque there, and a sensor its noise."""
+    """Raise InvalidError if the torque is exactly zero in several successive rows under pressure and speed: friction
+    gives a torque there, and a sensor noise."""
     needed = [columns.get(name) for name in ("pressure_bar", "speed_rpm", "torque_nm")]
     pressure, speed, torque = needed
     if reading.missing == NO_MISSING or pressure is None or speed is None or torque is None:
@@ -114,7 +114,8 @@ def refuse_no_torque(columns: Mapping[str, FloatArray], line_of: LineOf | None, 
 
 
 def refuse_stand_ins(name: str, values: NDArray[Any], line_of: LineOf | None, reading: Reading) -> None:
-    """Raise InvalidError naming the first number of a column [n] that may stand for no value, and what settles it."""
+    """Raise InvalidError on the first number of a column [n] that may be the mark of a missing value, with ways to
+    state its meaning."""
     if reading.missing == NO_MISSING or values.dtype.kind not in "iuf":
         return
     column = plain(values)
@@ -136,8 +137,8 @@ def refuse_stand_ins(name: str, values: NDArray[Any], line_of: LineOf | None, re
 
 
 def _stand_in(column: FloatArray, *, unbounded: bool) -> float | None:
-    """A value of a column [n] that stands for none; `unbounded`: values may grow for as long as a record lasts, as times
-    do."""
+    """A value of a column [n] that seems to mark missing values; `unbounded`: values may grow throughout a record, as
+    times do."""
     outermost = float(column.min(initial=np.inf)), float(column.max(initial=-np.inf))
     finite_values = column if np.isfinite(outermost).all() else column[np.isfinite(column)]
     if finite_values.size < 2:
@@ -175,14 +176,15 @@ def _ends(inner_values: FloatArray, end_of: Callable[[FloatArray], Any]) -> set[
 
 
 def _nines(value: float) -> int:
-    """Nines that a number begins with, if there are three; five for the ends of an integer type, at any decimal point."""
+    """A number's leading nines, if there are at least three; five for the ends of an integer type; at any decimal
+    point."""
     digits = f"{abs(value):.15g}".replace(".", "").lstrip("0")
     nines = len(digits) - len(digits.lstrip("9"))
     return 5 if digits.isdecimal() and int(digits) in _ENDS else nines if nines >= 3 and "e" not in digits else 0
 
 
 def _jumped_to(held: FloatArray, low: float, high: float) -> float | None:
-    """A value of nines to which samples [n] jump, and from which they come back to where they were."""
+    """A value of nines to which samples [n] jump and from which they return to their former level."""
     for value in (999.0, -999.0, 9999.0, -9999.0):
         if not low <= value <= high:
             continue
@@ -201,8 +203,8 @@ def _jumped_to(held: FloatArray, low: float, high: float) -> float | None:
 def drop_totals(
     columns: Mapping[int, NDArray[Any]], measured: list[int], table: Table
 ) -> tuple[dict[int, NDArray[Any]], Table]:
-    """Columns [n] by index and their table without the rows at an end of it, or of a level, that are the means, sums, maxima
-    of the others."""
+    """Columns [n] by index and their table, without rows at the end of it or of a level that are means, sums or maxima
+    of the other rows."""
     measured_columns = [columns[index] for index in measured]
     sizes = {column.size for column in measured_columns}
     numeric = all(column.dtype.kind in "iuf" for column in measured_columns)
@@ -237,7 +239,8 @@ def drop_totals(
 
 
 def _levels(columns: Sequence[NDArray[Any]]) -> list[tuple[int, int]]:
-    """Where the rows begin and end in which a column stays as it is: levels of a test, which may have a mean each."""
+    """The first and last rows of stretches in which a column is constant: levels of a test, each of which may end with
+    a row of means."""
     found = []
     for column in columns if columns[0].size <= _LONGEST_OF_LEVELS else ():
         ends = [0, *(np.flatnonzero(np.diff(plain(column)) != 0) + 1), column.size]
@@ -247,7 +250,8 @@ def _levels(columns: Sequence[NDArray[Any]]) -> list[tuple[int, int]]:
 
 
 def _totals(columns: list[FloatArray], most: int = _MAX_TOTALS) -> list[str]:
-    """What the last rows of columns [n], `most` at most, are made of, a word for each; empty where they may be measured."""
+    """The statistics in the last rows of columns [n], at most `most`, one word per row; empty if the rows may be
+    measured."""
     for count in range(min(most, columns[0].size - 3), 0, -1):
         above = [column[:-count] for column in columns]
         made_of, by_chance = [], 1.0
@@ -267,8 +271,8 @@ def _totals(columns: list[FloatArray], most: int = _MAX_TOTALS) -> list[str]:
 
 
 def _chance(above: list[FloatArray], row: list[float], name: str) -> float:
-    """How probable it is that a measured row is by chance a statistic of all columns above it, of the finite values in them;
-    infinite where it is not."""
+    """The probability that a measured row equals a statistic of all columns above it by chance, over their finite
+    values; infinite if it does not equal it."""
     chance = 1.0
     for held, value in zip(above, row, strict=True):
         column = held[np.isfinite(held)]
@@ -287,6 +291,6 @@ def _chance(above: list[FloatArray], row: list[float], name: str) -> float:
 
 
 def _half_a_digit(value: float) -> float:
-    """Half a unit of the last decimal that a number was written with."""
+    """Half a unit of a number's last written decimal."""
     decimals = len(f"{value:.9g}".partition(".")[2])
     return 0.5 * 10.0**-decimals

@@ -28,7 +28,8 @@ _APART = re.compile(r"^[+-]?[1-9]\d{0,2}(?:['’ \u00a0\u202f\u2009]\d{3})+(?![\
 
 
 def _readable(decimal: str, groups: str) -> re.Pattern[str]:
-    """Cells that are numbers where `decimal` is the decimal sign and `groups` may group thousands (1,100; 1,23,456)."""
+    """The cells that are numbers with `decimal` as decimal sign and `groups` as possible separator of thousands (1,100;
+    1,23,456)."""
     d, g = re.escape(decimal), re.escape(groups)
     grouped = rf"(?!0)\d{{1,3}}(?:{g}\d{{2,3}})*{g}\d{{3}}(?:{d}\d*)?"
     return re.compile(rf"[+-]?(?:{grouped}|\d+{d}?\d*(?:[eE][+-]?\d+)?|{d}\d+(?:[eE][+-]?\d+)?)", re.ASCII)
@@ -44,7 +45,7 @@ _WITH_UNIT = re.compile(
 
 
 def with_unit_apart(cell: Any) -> tuple[Any, str]:
-    """A cell that holds a number and its unit (`12,5 Nm`), as both; any other cell and no unit."""
+    """The number and the unit in a cell that holds both (`12,5 Nm`); any other cell unchanged, without a unit."""
     match = _WITH_UNIT.fullmatch(cell.strip()) if isinstance(cell, str) else None
     return (match["number"], match["unit"]) if match and is_unit(match["unit"]) else (cell, "")
 
@@ -53,7 +54,7 @@ _READABLE = {".": _readable(".", ","), ",": _readable(",", ".")}
 
 
 def _decimals(cell: Any) -> list[str]:
-    """The decimal signs by which a cell with a sign can be read."""
+    """The possible decimal signs of a cell."""
     if not isinstance(cell, str) or ("." not in cell and "," not in cell):
         return []
     bare = with_unit_apart(cell)[0].strip()
@@ -61,8 +62,9 @@ def _decimals(cell: Any) -> list[str]:
 
 
 class Numerals:
-    """The cells of one file: its decimal sign is given, or shown by the first cell that can be read in one way ("" until
-    then), the dates of each column follow one order, and all points in time are counted from one."""
+    """Converts the cells of one file: its decimal sign is given, or found from the first unambiguous cell ("" until
+    then), the dates of each column have one order of day and month, and all points in time count from the same moment.
+    """
 
     def __init__(self, reading: Reading) -> None:
         self.decimal = reading.decimal
@@ -73,7 +75,7 @@ class Numerals:
         self._zones: set[str] = set()
 
     def settle(self, columns: Sequence[Sequence[Any]]) -> bool:
-        """Learn the decimal sign from columns of cells; whether it is still open and a cell may be read in two ways."""
+        """Learn the decimal sign from columns of cells; true if it is still open and a cell is ambiguous."""
         doubtful = False
         for row in zip_longest(*columns) if not self.decimal else ():
             for signs in map(_decimals, row):
@@ -90,11 +92,11 @@ class Numerals:
         line_of: LineOf | None = None,
         before: int = 0,
     ) -> list[NDArray[Any]]:
-        """Columns [n] by their index, each for a channel: numbers as float64, masked where cells are empty; points in time
-        as numpy has them; for no channel ("") the cells themselves.
+        """Columns [n] converted to values, by their index, each for a channel: numbers as float64, masked where cells
+        are empty; points in time as in numpy; for no channel ("") the cells themselves.
 
-        `before` rows were read already. Raises InvalidError naming the rows of cells that are neither, or may be read in two
-        ways.
+        `before` is the number of rows read already. Raises InvalidError naming the rows of cells that are neither, or
+        ambiguous.
         """
         if self.settle([cells for name, cells in zip(channels.values(), columns, strict=True) if name]):
             for name, cells in zip(channels.values(), columns, strict=True):
@@ -119,7 +121,8 @@ class Numerals:
         return read
 
     def _column(self, index: int, name: str, cells: Sequence[Any]) -> NDArray[Any] | None:
-        """One column; None where a cell is no number by this file's decimal sign, in the unit behind the first number."""
+        """One column's values; None if a cell is no number by this file's decimal sign, in the unit of the column's
+        first cell."""
         if not name:
             objects = np.empty(len(cells), dtype=object)
             objects[:] = cells
@@ -142,7 +145,7 @@ class Numerals:
         return cell.casefold() in self._missing or (self._fills_down and is_ditto(cell))
 
     def _moments(self, index: int, cells: Sequence[Any]) -> NDArray[Any] | None:
-        """Dates, times of day, durations or their text; None where they are numbers or of several types."""
+        """Dates, times of day or durations of a column; None if its cells are numbers or of several types."""
         kinds = set(map(type, cells))
         if kinds and kinds <= {datetime, date}:
             plain = [
@@ -159,7 +162,7 @@ class Numerals:
         return self._stamps.setdefault(index, Stamps(self._origin, self._zones)).since_first(cells)
 
     def _floats(self, cells: Sequence[Any]) -> FloatArray | None:
-        """Cells as numbers; None where one is none, or not by this file's decimal sign."""
+        """Cells as numbers; None if any cell is no number by this file's decimal sign."""
         texts = [cell for cell in cells if isinstance(cell, str)]
         if not texts or len(texts) < len(cells):
             kinds = set(map(type, cells))
@@ -183,7 +186,7 @@ class Numerals:
         return np.array(list(map(float, texts))) if all(map(NUMBER.fullmatch, texts)) else None
 
     def _wrong(self, index: int, name: str, cells: Sequence[Any]) -> Iterator[tuple[int, str]]:
-        """The rows of a column that are no numbers, each with the rule that it breaks."""
+        """The rows of a column with no numbers, each with the broken rule."""
         swapped = Numerals(Reading(decimal="," if self.decimal == "." else "."))
         unit = self._units.get(index, "")
         for row, cell in enumerate(cells):
@@ -197,7 +200,8 @@ class Numerals:
 
 
 def read_cells(table: Table, channels: Mapping[int, str], reading: Reading) -> dict[int, NDArray[Any]]:
-    """A table's columns [n] by index, cells of any kind as numbers and points in time. Raises as `Numerals.values` does."""
+    """A table's columns [n] by index, with cells of any kind converted to numbers and points in time. Raises as
+    `Numerals.values` does."""
     read = dict(zip(channels, table.read(channels), strict=True))
     cells = {index: _cells(column) for index, column in read.items() if column.dtype.kind in "OUS"}
     named = {index: channels[index] for index in cells}
@@ -205,7 +209,7 @@ def read_cells(table: Table, channels: Mapping[int, str], reading: Reading) -> d
 
 
 def plain(values: NDArray[Any]) -> FloatArray:
-    """Numbers [n], NaN where they are masked, or all where they are none."""
+    """Numbers [n] with NaN for masked ones; all NaN if they are no numbers."""
     if values.dtype.kind not in "iuf":
         return np.full(values.size, np.nan)
     return np.array(np.ma.filled(np.ma.asarray(values, dtype=np.float64), np.nan))
@@ -225,7 +229,7 @@ def is_ditto(cell: Any) -> bool:
 
 
 def _remedy(shown: str) -> str:
-    """What helps where a cell is empty, or holds a word or a sign that may stand for no value."""
+    """The advice for an empty cell, a formula, or a word or sign that may mark a missing value."""
     if not shown:
         return ": fill the cell, or add missing=empty to leave out such rows"
     if shown.startswith("="):
@@ -239,13 +243,13 @@ def _remedy(shown: str) -> str:
 
 
 def empty_cells(name: str, rows: Sequence[int], line_of: LineOf | None, last: int) -> InvalidError:
-    """The error of cells that should hold numbers and are empty."""
+    """The error for empty cells that should hold numbers."""
     wrong = [(row, name, "", "must be a number") for row in rows[:MAX_ERRORS]]
     return _wrong(wrong, len(rows), line_of, last)
 
 
 def _wrong(wrong: Sequence[tuple[int, str, str, str]], total: int, line_of: LineOf | None, last: int) -> InvalidError:
-    """The error of cells that are no numbers: row, channel, text and rule of each; `last` is the last row that was read."""
+    """The error for cells that are no numbers: row, channel, text and rule of each; `last` is the last row read."""
     errors = [
         FieldError(
             pointer=f"/channels/{name}/{row}",
@@ -262,7 +266,7 @@ def _wrong(wrong: Sequence[tuple[int, str, str, str]], total: int, line_of: Line
 
 
 def _doubtful(name: str, row: int, cell: str, line_of: LineOf | None) -> InvalidError:
-    """The error of a cell that may be read in two ways, with both."""
+    """The error for an ambiguous cell, with both readings."""
     sign, other = (",", ".") if "," in cell else (".", ",")
     as_decimal, as_thousands = f"{float(cell.replace(sign, '.')):.9g}", cell.replace(sign, "")
     message = (
@@ -316,7 +320,7 @@ _CTIME = re.compile(r"[^\W\d]{2,3} ([^\W\d]{3}) +(\d{1,2}) ([\d:.]{5,15}) (\d{4}
 
 
 def _in_numbers(cell: str) -> str:
-    """A text with the month's name at its beginning as a number: `27. Nov. 2026 07:00` as `27.11.2026 07:00`."""
+    """A date with the name of the month as digits: `27. Nov. 2026 07:00` as `27.11.2026 07:00`."""
     cell = _TIME_FIRST.sub(r"\2 \1", cell)
     cell = _CTIME.sub(r"\2 \1 \4 \3", cell) if cell[:1].isalpha() else cell
     match = _NAMED.match(cell) if cell[:1].isalnum() else None
@@ -348,7 +352,7 @@ class Stamps:
         self._orders: set[str] = {"%d/%m/%Y", "%m/%d/%Y"}
 
     def since_first(self, cells: Sequence[str]) -> NDArray[np.timedelta64] | None:
-        """The next cells [n]; None where one is no point in time. Raises InvalidError on unclear dates."""
+        """The next cells [n] as points in time; None if one is none. Raises InvalidError on unclear dates."""
         nanoseconds = self._iso(cells)
         if nanoseconds is None:
             self._narrow(cells)
@@ -363,7 +367,7 @@ class Stamps:
         return (nanoseconds - origin).astype("timedelta64[ns]")
 
     def _past_midnight(self, times: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Times of day that go on where they step back by more than half a day."""
+        """Times of day continued into the next day at each step back by more than half a day."""
         before = times[0] if self._last is None else self._last
         days = self._days + np.cumsum(np.diff(times, prepend=before) < -_DAY // 2)
         self._last, self._days = int(times[-1]), int(days[-1])
@@ -427,7 +431,7 @@ class Stamps:
 
 
 def _duration(cell: str) -> int | None:
-    """The nanoseconds of a duration; None where a text is none."""
+    """A duration in nanoseconds; None if the text is no duration."""
     match = _DURATION.fullmatch(cell)
     if match is None:
         return None

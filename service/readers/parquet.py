@@ -43,7 +43,7 @@ def read_table(path: Path, _: Reading, limits: Limits) -> Table:
 
 
 def _stated(metadata: Mapping[bytes, bytes] | None) -> Tree:
-    """What the file says of its columns, as texts and folders, those of pandas' `attrs` among them."""
+    """The file's metadata about its columns, as texts and folders, including those of pandas' `attrs`."""
     stated: dict[str, Any] = {}
     for key, value in (metadata or {}).items():
         decoded = parsed(value.decode("utf-8", "replace"))

@@ -29,8 +29,8 @@ _Words = NDArray[np.uint64]
 
 
 def plain_columns(block: bytes, width: int, columns: Iterable[int]) -> list[NDArray[Any]] | None:
-    """The columns [rows] of a block of lines of `width` cells parted by commas; None where a cell is anything but plain, or
-    has more than eight digits before or behind its point."""
+    """The columns [rows] of a block of lines with `width` cells separated by commas; None if any cell is not a plain
+    number, or has more than eight digits before or after its decimal point."""
     if not block or block.translate(None, b"0123456789,.-\n"):
         return None
     text = np.frombuffer(block, np.uint8)
@@ -59,12 +59,12 @@ def plain_columns(block: bytes, width: int, columns: Iterable[int]) -> list[NDAr
 
 
 def _even(marks: NDArray[np.uint8]) -> bool:
-    """Whether the marks behind cells [rows, width] end a line after each row, and nowhere else."""
+    """Whether the separators after cells [rows, width] are a line end after each row and a comma elsewhere."""
     return bool((marks[:, -1] == _NEWLINE).all() and (marks[:, :-1] == _COMMA).all())
 
 
 def _points(text: NDArray[np.uint8], ends: NDArray[np.intp]) -> NDArray[np.intp] | None:
-    """Where each cell has its point, its end where it has none; None where one has two."""
+    """The position of each cell's decimal point, its end if it has none; None if a cell has two."""
     points = np.flatnonzero(text == _POINT)
     if points.size == ends.size and (points < ends).all() and (points[1:] > ends[:-1]).all():
         return points
@@ -83,7 +83,7 @@ def _numbers(
     ends: NDArray[np.intp],
     negative: NDArray[np.bool_] | None,
 ) -> FloatArray | None:
-    """The cells of a column; None where one has no digit, or too many."""
+    """The values of a column's cells; None if one has no digit, or too many."""
     before, behind = points - starts, ends - points
     if negative is not None:
         before -= negative
@@ -109,8 +109,8 @@ def _numbers(
 
 
 def _together(last: _Words, before: NDArray[np.intp], behind: int) -> FloatArray:
-    """Cells of at most eight bytes, all with the same number of characters `behind`, the point among them: the digits before
-    it are moved onto it."""
+    """The values of cells of at most eight bytes, all with the same number of characters `behind` from the decimal
+    point on: the digits before the point are shifted over it."""
     decimals = max(behind - 1, 0)
     if behind:
         fraction = _MASKS[decimals] * np.uint64(0x11)  # all of a byte
@@ -122,7 +122,7 @@ def _together(last: _Words, before: NDArray[np.intp], behind: int) -> FloatArray
 
 
 def _value(digits: _Words) -> _Words:
-    """The value of eight decimal digits, the first of them in the lowest byte."""
+    """The number with these eight decimal digits, the first of them in the lowest byte."""
     value = (digits * _TENS >> np.uint64(8)) & np.uint64(0x00FF00FF00FF00FF)
     value = (value * _HUNDREDS >> np.uint64(16)) & np.uint64(0x0000FFFF0000FFFF)
     return value * _TEN_THOUSANDS >> np.uint64(32)

@@ -13,8 +13,8 @@ _MAX_LINES = 50
 
 
 class ShownColumn(TypedDict):
-    """A column: its title, the units that the file and the caller's map state, the channel that it is taken for (None: left
-    out), and the unit that it is read in (None: not known)."""
+    """A column of a preview: its title, the units stated by the file and by the caller's map, its channel (None: left
+    out), and the unit it is read in (None: unknown)."""
 
     title: str
     name: str
@@ -26,8 +26,8 @@ class ShownColumn(TypedDict):
 
 
 class ShownTable(TypedDict):
-    """A table's name and those of the others, the cells above it and what they say, its first rows, and its columns.
-    `problem` says why these cannot be read so."""
+    """A table of a preview: its name and those of other tables, the cells above it and their labels, its first rows,
+    and its columns. `problem` says why the columns cannot be read."""
 
     table: str
     tables: list[str]
@@ -40,7 +40,7 @@ class ShownTable(TypedDict):
 
 
 def preview(table: Table, reading: Reading) -> ShownTable:
-    """The table and its columns, read or not."""
+    """The preview of a table and its columns, even if they cannot be read."""
     try:
         table, reading = widened(stacked_columns(with_constants(table, reading), reading), reading)
         constants(table, reading)

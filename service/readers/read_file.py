@@ -33,12 +33,12 @@ _NO_PART = ("no_header", "no_such_column", "title_too_long")
 
 
 def reading_of(mapping: str | None = None, **others: Any) -> Reading:
-    """How to read a file, with the columns as a map's text (`torque_nm:Mz,...`)."""
+    """The way to read a file, with the columns given as a map's text (`torque_nm:Mz,...`)."""
     return Reading(mapping=parse_map(mapping), **others)
 
 
 def read_file(path: Path, *, filename: str, reading: Reading | None = None, limits: Limits = LIMITS) -> Channels:
-    """The channels [n] of a file by public name, in the channels' units, and what was noticed.
+    """The channels [n] of a file by public name, in the channels' units, and notices from reading.
 
     `filename` is the sender's name for it. Raises InvalidError or TooLargeError, and nothing else, whatever the file holds;
     BusyError where the service is ending, or a reader cannot start.
@@ -48,13 +48,13 @@ def read_file(path: Path, *, filename: str, reading: Reading | None = None, limi
 
 
 def preview_file(path: Path, *, filename: str, reading: Reading | None = None, limits: Limits = LIMITS) -> ShownTable:
-    """The table as it is read, and what each column is taken for (`preview.preview`). Raises as `read_file` does."""
+    """The preview of a file's table, with each column's channel (`preview.preview`). Raises as `read_file` does."""
     shown: ShownTable = _read(path, filename, reading or Reading(), limits, "preview")
     return shown
 
 
 def suggest_file(path: Path, *, filename: str, reading: Reading, limits: Limits = LIMITS) -> Proposal | None:
-    """How a file that is not read without a question may be read (`suggest.propose`). Raises as `read_file` does."""
+    """A suggested way to read an ambiguous file (`suggest.propose`). Raises as `read_file` does."""
     proposed: Proposal | None = _read(path, filename, reading, limits, "suggestion")
     return proposed
 
@@ -79,7 +79,8 @@ def _answered(
 
 
 def _in_archive(path: Path, reading: Reading, limits: Limits, answer: sandbox.Answer) -> Any:
-    """What the one record in an archive holds; of several the one that `reading` names, as `file` or `file/table`."""
+    """The answer for the only record in an archive; if there are several, for the one that `reading` names, as `file`
+    or `file/table`."""
 
     def read_by(name: str, asked: Reading) -> Any:
         with unpacked(path, name, limits) as plain:
@@ -135,7 +136,7 @@ def _beside(path: Path, names: Sequence[str], reading: Reading, limits: Limits, 
 
 
 def _all_of_archive(names: Sequence[str], read: Callable[[str, Reading], Any], reading: Reading, answer: str) -> Any:
-    """The channels of all files of an archive, one below the other; the preview is that of the first."""
+    """The channels of all files of an archive, one below the other; for a preview, that of the first file."""
 
     def asked(name: str) -> Reading:
         stated = {channel: _by_name(name, channel, choice) for channel, choice in reading.mapping.items()}
@@ -159,7 +160,7 @@ def _all_of_archive(names: Sequence[str], read: Callable[[str, Reading], Any], r
 
 
 def _by_name(name: str, channel: str, choice: ColumnChoice) -> ColumnChoice:
-    """A choice with the value that a file's name states in place of `=sheets`."""
+    """A choice with `=sheets` replaced by the value that a file's name states."""
     value = value_of_part(PurePath(name).stem, (), channel) if choice.column == SHEETS else None
     return choice if value is None else replace(choice, column=f"={value:g}", unit=CHANNELS[channel].unit)
 

@@ -89,7 +89,8 @@ def read_isolated(
 
 
 def not_installed(kind: Format, consequence: str) -> str | None:
-    """None where a format's package is installed, else `consequence` (a format is not read here) and how to install it."""
+    """None if a format's package is installed, else `consequence` (the format cannot be read here) and how to install
+    it."""
     _, package, extra = READERS[kind]
     if find_spec(package) is not None:
         return None
@@ -151,7 +152,7 @@ def _too_much(kind: Format) -> TooLargeError:
 
 
 def _answer(result: BinaryIO, kind: Format, wanted: str, limits: Limits) -> Any:
-    """What the reading process wrote; its answer is checked before it is used."""
+    """The reading process's answer, checked before it is used."""
     try:
         answer = json.loads(result.readline(_LONGEST_ANSWER))
         if "error" in answer:
@@ -180,8 +181,7 @@ def _answer(result: BinaryIO, kind: Format, wanted: str, limits: Limits) -> Any:
 
 
 def _mapped(result: BinaryIO, kind: Format, size: int) -> FloatArray:
-    """The numbers [size] from the present place of the answer on: the file itself, whose pages are copied where they
-    change."""
+    """The numbers [size] from the answer's present position on, as a memory map of the file with copy on write."""
     offset, end = result.tell(), result.seek(0, os.SEEK_END)
     if size <= 0 or offset % _ALIGNED or end < offset + 8 * size:
         raise _broken_off(kind, "no answer")
@@ -189,7 +189,7 @@ def _mapped(result: BinaryIO, kind: Format, size: int) -> FloatArray:
 
 
 def _reading(held: Mapping[str, Any]) -> Reading:
-    """A reading as JSON has it."""
+    """A reading from its JSON."""
     mapping = {name: ColumnChoice(**choice) for name, choice in held["mapping"].items()}
     return Reading(**{**held, "mapping": mapping, "left_out": list(held["left_out"])})
 
@@ -204,13 +204,13 @@ def _error(answer: Mapping[str, Any]) -> ServiceError:
 
 
 def main() -> None:
-    """Divide for each file that the socket with the number of the first argument asks for."""
+    """The zygote process: forks a child for each file that arrives at the socket, whose number is the first argument."""
     with socket.socket(fileno=int(sys.argv[1])) as control:
         zygote.serve(control, _load, _read)
 
 
 def _load(request: Mapping[str, Any]) -> None:
-    """The module that reads a format, kept for further files; what keeps it from loading is the child's to say."""
+    """Load the module that reads a format, for this and further files; an error is reported later by the child."""
     with contextlib.suppress(Exception):
         importlib.import_module(READERS[Format(request["kind"])][0])
         _warm_up()
@@ -218,15 +218,15 @@ def _load(request: Mapping[str, Any]) -> None:
 
 @lru_cache(maxsize=1)
 def _warm_up() -> None:
-    """Read a small table, so that what reading compiles and imports on its first use is there for each file: a third of what
-    a record of a million values takes."""
+    """Read a small table, so that compiling and imports at the first use are done once for all files: they take a third
+    of the time for a record of a million values."""
     columns = tuple(map(column_of, ("Time [s]", "Pressure [bar]", "Speed [1/min]", "Torque [Nm]")))
     values = np.arange(1.0, 9.0)
     to_channels(Table(columns=columns, read=lambda taken: [values.copy() for _ in taken]), Reading(), LIMITS)
 
 
 def _read(request: Mapping[str, Any], answer: int) -> None:
-    """In a child: read the file that is asked for, and write the answer to the open file `answer`."""
+    """Read the requested file, in a child process, and write the answer to the open file `answer`."""
     sys.argv[1:] = [str(answer)]
     os.environ.update({"TMPDIR": request["folder"], "HOME": request["folder"]})
     tempfile.tempdir = request["folder"]

@@ -55,7 +55,7 @@ _VALUE = re.compile(r"\s*([+-]?\d+(?:[.,]\d*)?(?:[eE][+-]?\d+)?)\s*(\D*)")
 def stated_clock(
     held: Mapping[str, float | str], rows: Callable[[], int], stamps: Stamps, counted: str = ""
 ) -> Clock | None:
-    """The clock among names and what they hold: start + k · step [s] for each of the rows; None where none is stated.
+    """The clock stated by names and values: start + k · step [s] for each of the rows; None if none is stated.
 
     A start that is a point in time counts from the first one of the file, which `stamps` knows.
 
@@ -91,25 +91,25 @@ def stated_clock(
 
 
 def _moment(named: Mapping[str, float | str], stamps: Stamps) -> float:
-    """The point in time at which the samples begin, in s after the first one of the file; 0 where none is stated."""
+    """The time of the first sample, in s after the first time in the file; 0 if none is stated."""
     texts = [value.strip() for key, value in named.items() if isinstance(value, str) and re.fullmatch(_STARTS, key)]
     since = [stamps.since_first([text]) for text in texts if is_stamp(text)]
     return next((float(moment[0] / _SECOND) for moment in since if moment is not None), 0.0)
 
 
 def _is_decimation(key: str, value: float | str) -> bool:
-    """Whether a name says that fewer samples were kept than were taken."""
+    """Whether a name says that only some of the samples were kept."""
     match = _DECIMATION.search(f"{key} {value}")
     return match is not None and float(match[1]) != 1
 
 
 def evenly(start: float, step: float, rows: int) -> FloatArray:
-    """Times [rows] a step apart."""
+    """Equidistant times [rows] from a start and a step."""
     return start + step * np.arange(rows, dtype=np.float64)
 
 
 def _stated(named: Mapping[str, float | str], names: str) -> Iterator[tuple[float, str, str]]:
-    """The numbers under any of the names, each with its unit ("" where none is stated) and its name."""
+    """The numbers stored under any of the names, each with its unit ("" if none is stated) and its name."""
     for key, value in named.items():
         match = re.fullmatch(rf"(?:{names})(?:[_\[(]+(?P<unit>[^\W_]+/?[^\W_]*)[\])]?)?", key)
         text = _VALUE.fullmatch(value) if isinstance(value, str) else None
@@ -131,7 +131,7 @@ def _stated(named: Mapping[str, float | str], names: str) -> Iterator[tuple[floa
 
 
 def in_seconds(number: float, unit: str, key: str, *, rate: bool = False) -> float:
-    """A time, or the step of a rate [s]. Raises InvalidError where its unit is not known."""
+    """A time, or the step of a rate, in s. Raises InvalidError where its unit is not known."""
     known = None if rate else conversion("time_s", unit or "s")
     factor = _HERTZ.get(unit.lower()) if rate else None if known is None else known.factor
     if factor is None:

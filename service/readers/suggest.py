@@ -69,7 +69,8 @@ _UNIT_NAMED = re.compile(r"may be (\S+): state it with map=(\w+):")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Proposal:
-    """How a file may be read, and how sure that is, 0 to 1; `titles`: all columns of the file as a profile names them."""
+    """A suggested reading of a file with its confidence, 0 to 1; `titles`: all columns of the file as a profile names
+    them."""
 
     reading: Reading
     confidence: float
@@ -79,9 +80,9 @@ class Proposal:
 def propose(
     read_table: Callable[[Reading], Table], reading: Reading, limits: Limits, filename: str = ""
 ) -> Proposal | None:
-    """The reading by which the file gives the channels of a test; None where none is found. `read_table` reads its table.
+    """A reading by which the file gives the channels of a test; None if none is found. `read_table` reads its table.
 
-    A file of several parts alike is read as all of them. Raises TooLargeError as reading does.
+    A file of several similar parts is read as all of them. Raises TooLargeError as reading does.
     """
     whole = replace(reading, table=ALL)
     if not reading.table and _has_parts(read_table, whole):
@@ -101,7 +102,7 @@ def _has_parts(read_table: Callable[[Reading], Table], whole: Reading) -> bool:
 def _attempt(
     read_table: Callable[[Reading], Table], reading: Reading, limits: Limits, filename: str
 ) -> Proposal | None:
-    """The reading, with what is wrong with it mended one thing after the other."""
+    """The reading corrected step by step, each time as the error of an attempt to read demands; None if it fails."""
     confidence, asked, clock = 1.0, reading, False
     for _ in range(_MAX_STEPS):
         try:
@@ -131,7 +132,7 @@ def _attempt(
 
 
 def _titles(table: Table, reading: Reading) -> tuple[str, ...]:
-    """All columns as a profile names them."""
+    """All columns by their names in a profile."""
     wide, _ = widened(stacked_columns(with_constants(table, reading), reading), reading)
     return tuple(dict.fromkeys(_title(own) for own in wide.columns if own.name and not own.name.startswith("=")))
 
@@ -140,8 +141,7 @@ def _titles(table: Table, reading: Reading) -> tuple[str, ...]:
 
 
 def _named(table: Table, asked: Reading, filename: str, *, clock: bool) -> tuple[Reading, float]:
-    """The reading with a column for each channel that has one, and the confidence of that; `clock`: one of several times
-    too."""
+    """The reading with a column for each channel that has one, and its confidence; `clock`: also one of several times."""
     if (crossed := _crossed(table, asked)) is not None:
         return crossed
     stacked = stacked_columns(with_constants(table, asked), asked)
@@ -179,8 +179,8 @@ def _named(table: Table, asked: Reading, filename: str, *, clock: bool) -> tuple
 
 
 def _crossed(table: Table, asked: Reading) -> tuple[Reading, float] | None:
-    """How a table is read whose titles are values, of pressure over a column of speeds or of speed over one of pressures,
-    and whose cells are torques; None where it is of another form."""
+    """The reading of a two-way table: its titles are values (of pressure over a column of speeds, or of speed over a
+    column of pressures) and its cells are torques; None for a table of another form."""
     over = [own for own in table.columns[1:] if own.title]
     plain_values = all(is_value(with_unit_apart(own.title)[0]) for own in over)
     if len(over) < 2 or asked.mapping or not (plain_values or any(_all_values(over, of) for of in _NEEDED)):
@@ -210,12 +210,12 @@ def _crossed(table: Table, asked: Reading) -> tuple[Reading, float] | None:
 
 
 def _all_values(columns: Sequence[FileColumn], channel: str) -> bool:
-    """Whether the titles of all columns are nothing but a value of a channel (`p=2bar`)."""
+    """Whether all columns' titles consist of a channel's value alone (`p=2bar`)."""
     return all((value_of_column(own, channel) or (0, ""))[1] == CELLS for own in columns)
 
 
 def _unit_among(texts: Sequence[str], channel: str) -> str | None:
-    """The first unit of a channel that stands in one of the texts, in brackets or at their end."""
+    """The first unit of a channel in one of the texts, in brackets or at their end."""
     return next(
         (unit for text in texts if (unit := column_of(text[:LONGEST_TITLE]).unit) and measures(channel, unit)), None
     )
@@ -224,8 +224,8 @@ def _unit_among(texts: Sequence[str], channel: str) -> str | None:
 def _settled(
     table: Table, scores: Mapping[int, float], channel: str, mapping: Mapping[str, ColumnChoice], reading: Reading
 ) -> tuple[int | None, float]:
-    """The likeliest column, and its confidence. Of rivals all must hold the same values, in whatever units; a pressure may
-    be the one by which the torque goes. None where only a person knows which."""
+    """The likeliest column and its confidence. Rivals must all hold the same values, in any units; a pressure may be
+    the one that torque follows. None if only a person can decide."""
     best = max(scores.values(), default=0.0)
     rivals = [at for at, score in scores.items() if score >= _RIVAL * best]
     rivals = [at for at in rivals if table.columns[at].unit is not None] or rivals
@@ -257,7 +257,7 @@ def _settled(
 
 
 def _converted(cells: NDArray[Any], column: FileColumn, channel: str) -> FloatArray:
-    """A column's values [n] in the channel's unit, as far as it states one."""
+    """A column's values [n] in the channel's unit if it states one, else unchanged."""
     values = plain(cells)
     converted = conversion(channel, column.unit or "")
     if converted is not None:
@@ -273,7 +273,7 @@ def _correlation(values: FloatArray, others: FloatArray) -> float:
 
 
 def _address(table: Table, at: int) -> str:
-    """A column's name as a map has it: with its unit, or its number, where others have the same."""
+    """A column's name for a map: with its unit, or its number if several columns share the name."""
     column = table.columns[at]
     name, titles = _title(column), [own.title for own in table.columns]
     equal = [other for other, own in enumerate(table.columns) if _title(own) == name]
@@ -288,12 +288,12 @@ def _address(table: Table, at: int) -> str:
 
 
 def _title(column: FileColumn) -> str:
-    """A column's name as a profile has it."""
+    """A column's name in a profile."""
     return f"{column.group}/{column.name}" if column.group else column.name
 
 
 def _likelihood(column: FileColumn, channel: str) -> float:
-    """How probable it is by its name and its unit that a column holds a channel."""
+    """The probability that a column holds a channel, by its name and unit."""
     of, sense = meaning(column.name, column.unit)
     if column.unit is None and _ends_in_another_unit(channel, column.name):
         return 0.0
@@ -316,19 +316,19 @@ def _likelihood(column: FileColumn, channel: str) -> float:
 
 
 def _ends_in_another_unit(channel: str, name: str) -> bool:
-    """Whether the last word of a name is a unit of something else (`Axial_Force_kN`)."""
+    """Whether a name's last word is a unit of another quantity (`Axial_Force_kN`)."""
     *others, last = re.split(r"[\s_]+", name.strip())
     return bool(others) and is_unit(last) and _unit_at_the_end(channel, name) is None
 
 
 def _unit_at_the_end(channel: str, name: str) -> str | None:
-    """A unit of a channel that is the last word of a name, whatever its capitals (`pressure_mpa`)."""
+    """The channel's unit in the last word of a name, ignoring case (`pressure_mpa`)."""
     *others, last = re.split(r"[\s_]+", name.strip())
     return next((unit for unit in (last, last.upper()) if others and conversion(channel, unit)), None)
 
 
 def _best(scores: Mapping[int, float]) -> tuple[int | None, float]:
-    """The likeliest column, the first of equal ones, and its confidence beside its rivals."""
+    """The likeliest column (the first of equal ones), and its confidence in view of its rivals."""
     if not scores:
         return None, 1.0
     at = max(scores, key=lambda place: scores[place])
@@ -337,7 +337,7 @@ def _best(scores: Mapping[int, float]) -> tuple[int | None, float]:
 
 
 def _choice(table: Table, at: int, channel: str, reading: Reading) -> tuple[ColumnChoice, float]:
-    """A column with its unit, the one that its values suggest where it states none; and the confidence of that."""
+    """A column with its unit, or the unit that its values suggest if it states none; and its confidence."""
     column, title = table.columns[at], _address(table, at)
     if column.unit is not None or column.name == channel:
         return ColumnChoice(column=title), 1.0
@@ -350,7 +350,7 @@ def _choice(table: Table, at: int, channel: str, reading: Reading) -> tuple[Colu
 
 
 def _unit_by_size(channel: str, values: FloatArray) -> str:
-    """The first unit in which values [n] have a size that the channel may have; its own where none fits."""
+    """The first unit in which values [n] have a plausible size for the channel; the channel's own if none fits."""
     finite = values[np.isfinite(values)]
     if channel == "time_s":
         steps = np.diff(finite)
@@ -367,8 +367,8 @@ def _unit_by_size(channel: str, values: FloatArray) -> str:
 
 
 def _time(table: Table, free: Mapping[int, FileColumn], reading: Reading, *, needed: bool) -> tuple[int | None, float]:
-    """The column that is the time, and how sure; none where the file's own names or clocks say it, and no choice is
-    `needed`."""
+    """The column that is the time, and its confidence; none if the file's own names or clocks state it, and no choice
+    is `needed`."""
     whole = [at for at, own in free.items() if meaning(own.name, own.unit) == ("time_s", Sense.WHOLE)]
     stated = any(column.clock is not None for column in table.columns)
     unitless = len(whole) == 1 and free[whole[0]].unit is None
@@ -427,7 +427,7 @@ def _mended(
     limits: Limits,
     filename: str,
 ) -> tuple[Reading, float] | None:
-    """The reading with what a refusal asks for, and the confidence of that; None where nobody but a person knows."""
+    """The reading corrected as a refusal's error demands, and the confidence in that; None if only a person can decide."""
     if wrong.code == "which_table" and not asked.table:
         return _table_chosen(wrong.value, asked, read_table)
     if wrong.code == "perhaps_the_time":
@@ -450,7 +450,7 @@ def _mended(
 
 
 def _table_chosen(first: str, asked: Reading, read_table: Callable[[Reading], Table]) -> tuple[Reading, float]:
-    """All parts, if they are alike; else the first table."""
+    """The reading of all parts, if they are alike; else of the first table."""
     whole = replace(asked, table=ALL)
     parts = read_table(whole).parts
     return (
@@ -463,7 +463,7 @@ def _table_chosen(first: str, asked: Reading, read_table: Callable[[Reading], Ta
 def _sign_chosen(
     asked: Reading, read_table: Callable[[Reading], Table], limits: Limits, filename: str
 ) -> tuple[Reading, float] | None:
-    """The reading with the decimal sign by which values change least from row to row, and with what else it asks for."""
+    """The reading with the decimal sign by which values change least from row to row, with its other corrections."""
     changes: dict[str, float] = {}
     mended: dict[str, Proposal] = {}
     for sign in (",", "."):
@@ -478,6 +478,6 @@ def _sign_chosen(
 
 
 def _changes(columns: Iterable[FloatArray]) -> Iterator[float]:
-    """Of each column [n] the mean step of the logarithm of its size."""
+    """The mean step of the logarithm of the absolute values, for each column [n]."""
     for column in columns:
         yield float(np.abs(np.diff(np.log(np.abs(column) + 1e-3))).mean()) if column.size > 1 else 0.0

@@ -29,10 +29,10 @@ NO_MISSING, ABOVE = "none", "above"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ColumnChoice:
-    """The column of a channel: its title, or what stands for one (`constants`), and its unit; value = factor · converted +
-    offset, in the channel's unit.
+    """The column of a channel: its title, or a constant's text (`constants`), and its unit; value = factor · converted
+    + offset, in the channel's unit.
 
-    `unit` takes the place of what the file states, which must be that unit or `stated`; None: the file's own.
+    `unit` replaces the file's unit, which must be that unit or `stated`; None: the file's own.
     """
 
     column: str
@@ -42,13 +42,14 @@ class ColumnChoice:
     offset: float = 0.0
 
     def is_constant(self) -> bool:
-        """Whether it names no column but a value: `=5 bar`, or `=LABEL` of what stands above the table."""
+        """Whether it names a value in place of a column: `=5 bar`, or `=LABEL` for the text beside a label above the
+        table."""
         return self.column.startswith("=") and self.column not in (COLUMNS, SHEETS, CELLS)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reading:
-    """How to read a file; empty where the file says it all. A rig profile keeps one.
+    """How to read a file; empty if the file states everything itself. A rig profile keeps one.
 
     `mapping`: channel -> its column; `only_named`: no other column is taken. `left_out`: titles that are left out on
     purpose. `table`: the sheet, group or archived file, or ALL. `time`: the title of the time column, or NO_TIME. `decimal`:
@@ -69,7 +70,7 @@ class Reading:
     good: str = ""
 
     def reads_all(self) -> bool:
-        """Whether all parts of a file are read, one below the other."""
+        """Whether all parts of a file are read and appended to each other."""
         return self.table == ALL or any(choice.column == SHEETS for choice in self.mapping.values())
 
 
@@ -103,7 +104,7 @@ class FileColumn:
     clock: Clock | None = None
 
     def shown(self) -> str:
-        """The name for a message."""
+        """The column's name for a message."""
         return f"{self.group}/{self.name}"[:MAX_QUOTED] if self.group else self.name[:MAX_QUOTED]
 
 
@@ -135,7 +136,8 @@ class Table:
 
 
 def marks(missing: str, channel: str = "") -> list[str]:
-    """The marks of all channels in a list such as `-9999,torque_nm:0`, and those of one `channel`, in small letters."""
+    """The marks in a list such as `-9999,torque_nm:0` that hold for all channels, and those of one `channel`, in lower
+    case."""
     if missing == NO_MISSING:
         return []
     stated = [mark.strip().casefold() for mark in missing.split(",") if mark.strip()]
@@ -147,12 +149,13 @@ def marks(missing: str, channel: str = "") -> list[str]:
 
 
 def fills_down(missing: str) -> bool:
-    """Whether an empty cell holds what stands above it."""
+    """Whether an empty cell repeats the value above it."""
     return ABOVE in marks(missing)
 
 
 def labels(above: Sequence[Sequence[str]]) -> dict[str, str]:
-    """What the lines above a table say: `label: value`, `label = value` or a label, its value and its unit in cells."""
+    """Labels and their values from the lines above a table: `label: value`, `label = value`, or label, value and unit
+    in cells."""
     values_by_label: dict[str, str] = {}
     for row in above:
         cells = [cell for cell in row if cell]
@@ -184,6 +187,6 @@ def index_of_wanted(names: Sequence[str], wanted: str, kind: str) -> int:
 
 
 def cut_short(defect: str) -> InvalidError:
-    """The error of a file whose end is missing."""
+    """The error for a file with its end missing."""
     message = f"the end of the file is missing: {defect}. Send the complete file"
     return InvalidError.of(message, code="truncated")

@@ -62,8 +62,8 @@ NUMERIC = re.compile(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Layout:
-    """Where a table is: of each column the title, unit, group and first cell; the row of its titles, the first row of data,
-    how many rows with numbers beside a label stand between, and a score by which other rows of titles compare."""
+    """The place of a table: each column's title, unit, group and first cell; the row of titles, the first row of data,
+    the number of labelled rows with numbers between them, and a score for comparison with other rows of titles."""
 
     headings: tuple[tuple[str, str, str, Any], ...]
     titles: int
@@ -76,7 +76,8 @@ class Layout:
         return tuple((title, unit, group) for title, unit, group, _ in self.headings)
 
     def fit(self) -> tuple[int, ...]:
-        """How well a separator or an encoding reads the table: known titles, less what they are more or fewer than cells."""
+        """The quality of a reading by a separator or an encoding: known titles, less the difference between the numbers
+        of titles and cells."""
         return self.score[0] + self.score[1], *self.score
 
     def columns(self) -> tuple[FileColumn, ...]:
@@ -90,9 +91,9 @@ class Layout:
 
 
 class DataRows:
-    """Which rows under a table's titles are its data: none that is blank, is one of those above again, or a footer.
+    """The data rows under a table's titles: neither blank rows, nor repeated rows from above, nor footers.
 
-    Titles that stand again, and lines of words with a number in them (`4 bar`), begin a further block of the table.
+    Repeated titles, and lines of words with a number in them (`4 bar`), begin a new block of the table.
     """
 
     def __init__(self, rows: Sequence[Row], layout: Layout) -> None:
@@ -109,7 +110,7 @@ class DataRows:
         self.begin()
 
     def begin(self) -> None:
-        """Begin with the first row: the rows may be read several times."""
+        """Begin again with the first row: the rows may be read several times."""
         self.breaks.clear()
         self.heads[:] = [self._over]
         self.notices.clear()
@@ -151,7 +152,7 @@ class DataRows:
         return [number for number, _ in data_rows], [row for _, row in data_rows]
 
     def _begin_block(self, data_rows: list[tuple[int, Row]], before: int) -> None:
-        """Before a row of data: what stood since the last one begins a block, or is no footer."""
+        """Before a row of data: treat the lines since the last data row as the head of a new block, or as data."""
         if self._titles_again or any(any(map(str.isdigit, "".join(shown(row)))) for _, row in self._words):
             if before + len(data_rows):
                 self.breaks.append(before + len(data_rows))
@@ -161,8 +162,8 @@ class DataRows:
         self._words, self._comments, self._titles_again, self._after_summary = [], [], False, False
 
     def _is_summary(self, row: Row) -> bool:
-        """Whether a row says that it is made of those above: by a word for it, or as one begins it where others have a
-        number, and numbers follow."""
+        """Whether a row holds a statistic of the rows above: it has a word for one, or begins with a word in place of a
+        number and goes on with numbers."""
         place = next((place for place, cell in enumerate(row) if cell not in (None, "")), 0)
         has_values = sum(map(is_value, row))
         first = sum(map(is_value, self.first_row))
@@ -177,12 +178,12 @@ class DataRows:
         return self._after_summary
 
     def _is_label(self, row: Row) -> bool:
-        """Whether a row is nothing but a value with its unit (`4 bar`), where others have several cells."""
+        """Whether a row is one value with its unit (`4 bar`) in a table with several cells per row."""
         filled = [cell for cell in row if cell not in (None, "")]
         return len(filled) == 1 < len(self.first_row) and bool(with_unit_apart(filled[0])[1])
 
     def _refuse_other_titles(self, number: int, row: Row) -> None:
-        """Raise InvalidError on titles or units that are not those of the table."""
+        """Raise InvalidError on titles or units different from the table's."""
         if _are_units(row) or (not any(map(is_value, row)) and recognised(list(map(_text, row)), ()) > 1):
             got = " ".join(shown(row)).strip()[:MAX_QUOTED]
             message = (
@@ -192,7 +193,7 @@ class DataRows:
             raise InvalidError.of(message, code="mixed_units", value=got)
 
     def end(self) -> None:
-        """Say what was left out among the rows, once all are read."""
+        """Add the notice on rows left out, once all rows are read."""
         if self._summaries:
             self._leave_out(self._summaries, "of means, extremes or sums in")
 
@@ -208,7 +209,7 @@ def _is_summary(row: Row, words: re.Pattern[str] = _SUMMARY) -> bool:
 
 
 def table_in(data: DataRows, *, first_line: int, rows_read: Callable[[], int], **others: Any) -> Table:
-    """The table of a grid, each column with the clock that the rows above it state, or its own cell in them.
+    """The table of a grid, each column with the clock stated in the rows above it.
 
     LabVIEW's column of times may be empty: then it is none. Raises InvalidError where a row above holds factors.
     """
@@ -239,7 +240,7 @@ def table_in(data: DataRows, *, first_line: int, rows_read: Callable[[], int], *
 
 
 def _counted(columns: Sequence[FileColumn], head: Sequence[Sequence[str]]) -> str:
-    """Which column of whole numbers that is no channel counts samples in steps of several; "" where none does."""
+    """The column of integers, no channel, that counts samples in steps of several; "" if there is none."""
     for place, column in enumerate(columns):
         cells = [row[place] for row in head if len(row) > place]
         named = column.unit or known_channel(column.name) or is_unit(column.name)  # the milliseconds of a second
@@ -257,9 +258,9 @@ def shown(row: Row) -> tuple[str, ...]:
 
 
 def find_table(rows: Sequence[Row], comments: frozenset[int], named: Sequence[str]) -> Layout | None:
-    """The table in the first rows of a grid; None where no row of titles stands over numbers.
+    """The table in the first rows of a grid; None if no row of titles stands over numbers.
 
-    `comments` are rows that may hold titles and no data; `named` are titles that the caller names.
+    `comments` are rows that may hold titles but no data; `named` are titles named by the caller.
     """
     rows = _with_definitions(rows)
     runs = list(_runs(rows, comments)) or [(len(rows), 0)]
@@ -281,7 +282,7 @@ def find_table(rows: Sequence[Row], comments: frozenset[int], named: Sequence[st
 
 
 def _with_definitions(rows: Sequence[Row]) -> Sequence[Row]:
-    """The rows with what a list of channels above them defines (`CH1;Torque;...;Nm`) in place of the channels' numbers."""
+    """The rows with titles and units of a channel list above them (`CH1;Torque;...;Nm`) in place of their numbers."""
     defined: dict[str, str] = {}
     for row in rows:
         channel, *cells = map(_text, row) if len(row) > 2 else [""]
@@ -299,7 +300,7 @@ def _with_definitions(rows: Sequence[Row]) -> Sequence[Row]:
 
 
 def _runs(rows: Sequence[Row], comments: frozenset[int]) -> Iterator[tuple[int, int]]:
-    """Runs of rows with a number or a time in them: where each starts and how many rows it has."""
+    """The runs of rows with a number or a time in them: first row and number of rows."""
     start, length = 0, 0
     for index, row in enumerate(rows):
         if index in comments or is_blank(row):
@@ -314,8 +315,8 @@ def _runs(rows: Sequence[Row], comments: frozenset[int]) -> Iterator[tuple[int, 
 
 
 def _skip_labelled_rows(rows: Sequence[Row], comments: frozenset[int], start: int, length: int) -> tuple[int, int]:
-    """Where a run begins without its first rows that hold numbers of another kind beside a label (`Length;12;12`), and
-    how many those are."""
+    """The start of a run after its first rows with other numbers beside a label (`Length;12;12`), and the number of
+    those rows."""
     run = [index for index in range(start, len(rows)) if index not in comments and not is_blank(rows[index])][:length]
     usual = rows[run[length // 2]] if run else ()
     others = (k for k, at in enumerate(run) if not (is_footer(rows[at], usual) or _numbers_columns(rows[at], usual)))
@@ -330,12 +331,12 @@ def _numbers_columns(row: Row, usual: Row) -> bool:
 
 
 def is_blank(row: Row) -> bool:
-    """Whether a row holds nothing."""
+    """Whether all cells of a row are empty."""
     return all(cell is None or cell == "" for cell in row)
 
 
 def is_value(cell: Any) -> bool:
-    """Whether a cell is a number or a point in time, or a formula for one that no program has computed."""
+    """Whether a cell is a number or a point in time, or a formula without a computed value."""
     if isinstance(cell, str):
         if cell[:1] == "=" != cell:
             return True
@@ -344,13 +345,13 @@ def is_value(cell: Any) -> bool:
 
 
 def _has_values(row: Row) -> bool:
-    """Whether a row holds values: not one of units of which some are multiples (`s;bar;0.01 Nm`)."""
+    """Whether a row holds values, in contrast to a row of units with some multiples (`s;bar;0.01 Nm`)."""
     values = [is_value(cell) for cell in row if cell not in (None, "")]
     return any(values) and (all(values) or not _are_units(row))
 
 
 def refuse_factors(above: Sequence[Sequence[str]]) -> None:
-    """Raise InvalidError where a line above the data has factors of the columns, which may be applied to them or not."""
+    """Raise InvalidError if a line above the data has factors of the columns, which may or may not be applied already."""
     for index, row in enumerate(above):
         for place, cell in enumerate(row[1:], 1):
             below = [other[place] for other in above[index + 1 :] if len(other) > place]
@@ -366,7 +367,8 @@ def refuse_factors(above: Sequence[Sequence[str]]) -> None:
 
 
 def is_footer(row: Row, other: Row) -> bool:
-    """Whether a row is none of the table of `other`: it begins with a word where that has none; or has no value."""
+    """Whether a row does not belong to the table of the row `other`: it begins with a word where `other` has a value or
+    nothing, or has no value at all."""
     place, cell = next(((place, cell) for place, cell in enumerate(row) if cell not in (None, "")), (0, None))
     if cell is None or is_value(cell) or is_ditto(cell):
         return False
@@ -380,14 +382,14 @@ def _is_moment(cell: Any) -> bool:
 
 
 def _is_word(title: str, cell: Any) -> bool:
-    """Whether a column of the time holds words: no unit is what it lacks."""
+    """Whether a cell in a time column is a word, so that a missing unit is not the problem."""
     return isinstance(cell, str) and bool(cell) and not is_value(cell) and known_channel(title) == "time_s"
 
 
 def _layout(
     rows: Sequence[Row], comments: frozenset[int], start: int, length: int, named: Sequence[str]
 ) -> Layout | None:
-    """The layout of the data from row `start` on: the row above them that knows most channels has the titles."""
+    """The layout of the data from row `start` on; the titles are the row above with most known channels."""
     start, labelled = _skip_labelled_rows(rows[:-1], comments, start, length)
     above = _text_rows_above(rows, comments, start)
     width = max((index + 1 for index, cell in enumerate(rows[start]) if cell not in (None, "")), default=0)
@@ -441,14 +443,14 @@ def _beside_units(titles: Sequence[str], below: Row) -> Sequence[str]:
 
 
 def _states_value(row: Row) -> bool:
-    """Whether a row is one cell that states a value (`p = 4 bar`): a block's, and no title."""
+    """Whether a row is one cell that states a value (`p = 4 bar`), which is a block's head and no title."""
     texts = list(filter(None, map(_text, row)))
     return len(texts) == 1 and re.search(r"[=: ]\s*\d", texts[0]) is not None and _BRACKETS.search(texts[0]) is None
 
 
 def _crosses(row: Row, below: Row) -> bool:
-    """Whether a row has values of another quantity over the columns below it (`Speed [rpm];2;4;6`): a word, and then numbers
-    that rise or fall, one over each column."""
+    """Whether a row is the head of a two-way table (`Speed [rpm];2;4;6`): a word, then rising or falling numbers, one
+    over each column."""
     cells = [with_unit_apart(cell)[0] for cell in row[1:]]
     texts = [str(cell).strip().replace(",", ".") for cell in cells]
     if len(row) != len(below) or len(cells) < 2 or is_value(row[0]) or not all(map(NUMBER.fullmatch, texts)):
@@ -473,8 +475,8 @@ def _text_rows_above(rows: Sequence[Row], comments: frozenset[int], start: int) 
 
 
 def _titles(rows: Sequence[Row], upwards: Sequence[int], width: int, data: Sequence[Row]) -> Iterator[list[str]]:
-    """The titles that a row may give: its own texts, those of all columns but the first, its gaps filled from above, and
-    both rows' texts joined."""
+    """The possible titles from a row: its own texts, those of all columns but the first, with gaps filled from above,
+    and both rows' texts joined."""
     titles_row = [_text(cell) for cell in rows[upwards[0]]]
     while titles_row and not titles_row[-1]:
         titles_row.pop()
@@ -518,7 +520,7 @@ def _have_names(rows: Sequence[Row], titles: Sequence[str]) -> bool:
 
 
 def _filled(texts: Sequence[str], size: int) -> list[str]:
-    """The texts of merged cells, each over the empty ones after it."""
+    """The texts of merged cells, each repeated over the empty cells after it."""
     filled = [*texts, *[""] * size][:size]
     for place in range(1, size):
         filled[place] = filled[place] or filled[place - 1]
@@ -530,7 +532,7 @@ def _text(cell: Any) -> str:
 
 
 def _are_units(row: Row) -> bool:
-    """Whether all that is there are units, under a word that says so or none."""
+    """Whether all texts are units, with or without a word above that says so."""
     labelled = bool(row) and _UNIT_LABELS.fullmatch(_text(row[0])) is not None
     stated = [unit for unit in map(bare_unit, map(_text, row[labelled:])) if unit]
     return bool(stated) and all(map(is_unit, stated))
@@ -539,8 +541,8 @@ def _are_units(row: Row) -> bool:
 def _units(
     rows: Sequence[Row], below: Sequence[int], at: int, start: int, titles: Sequence[str], width: int
 ) -> list[str]:
-    """The units beside the titles in row `at`: of the rows under it, one over it and those that are labelled so, and of the
-    ways in which these may stand to the titles, those that hold most units of them."""
+    """The units of the titles in row `at`: from the rows below it, one above it, or rows labelled as units, the row and
+    assignment that fits most titles."""
     texts = {index: [_text(cell) for cell in rows[index]] for index in range(max(0, start - MAX_ROWS), start)}
     labelled = [index for index, row in texts.items() if row and _UNIT_LABELS.fullmatch(row[0])]
     over = [at - 1] if at and _are_units(texts[at - 1]) else []
@@ -553,8 +555,8 @@ def _units(
 
 
 def _placements_of_units(units: Sequence[str], titles: Sequence[str], width: int) -> Iterator[Sequence[str]]:
-    """A row of units as it stands to the titles, each under its own; or, where every one fits then, those of all columns
-    that are known, or known and no time, one after the other, as writers leave out what needs none."""
+    """The possible assignments of a row of units to the titles: each under its own title; or, if all fit, one after the
+    other to all known columns, with or without the time, because some writers leave out columns without a unit."""
     yield units
     stated = [unit for unit in units if unit and not _UNIT_LABELS.fullmatch(unit)]
     channels = [known_channel(column_of(title).name) if len(title) <= LONGEST_TITLE else None for title in titles]
@@ -567,13 +569,13 @@ def _placements_of_units(units: Sequence[str], titles: Sequence[str], width: int
 
 
 def _fits(title: str, cell: str) -> bool:
-    """Whether a cell is a unit of its title, or any where the title is not known."""
+    """Whether a cell is a unit of its title's channel, or any unit if the title is unknown."""
     unit, channel = bare_unit(cell) or "", known_channel(title)
     return is_unit(unit) if channel is None else conversion(channel, unit) is not None
 
 
 def turned(rows: Sequence[Row], named: Sequence[str]) -> tuple[list[Row], Layout] | None:
-    """The rows of a table that lies on its side, a line a channel, and its layout; None where it does not."""
+    """The rows of a table with one channel per line, transposed, and its layout; None if the table is not of this form."""
     on_its_side: list[Row] = list(zip_longest(*rows, fillvalue=""))
     layout = find_table(on_its_side[:MAX_ROWS], frozenset(), named) if len(on_its_side) > 2 else None
     upright = max((recognised(list(map(_text, row)), named) for row in rows[:MAX_ROWS]), default=0)
@@ -581,7 +583,7 @@ def turned(rows: Sequence[Row], named: Sequence[str]) -> tuple[list[Row], Layout
 
 
 def no_table(rows: Sequence[Row], named: Sequence[str]) -> InvalidError:
-    """The error of a text or sheet without a row of titles over numbers: what stands where the one or the others should."""
+    """The error for a text or sheet without a row of titles over numbers; it quotes the rows in question."""
     filled = [index for index, row in enumerate(rows) if not is_blank(row)] or [0]
     best = max(filled, key=lambda index: recognised(list(map(_text, rows[index])), named) if rows else 0)
     under = next((index for index in filled if index > best), None)

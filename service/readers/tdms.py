@@ -32,7 +32,7 @@ _SECOND = np.timedelta64(1, "s")
 
 
 def read_table(path: Path, reading: Reading, limits: Limits) -> Table:
-    """The channels of all groups, or of the one that is named. Raises InvalidError on a file that is cut off."""
+    """The channels of all groups, or of the named one. Raises InvalidError on a file that is cut off."""
     file = TdmsFile.open(path)
     if file.file_status.incomplete_final_segment:
         raise cut_short("its last TDMS segment is not complete")
@@ -76,7 +76,7 @@ def _table(file: Any, groups: Sequence[Any], name: str, limits: Limits) -> Table
 
 
 def _scales(channel: Any) -> dict[str, str]:
-    """The kinds of scales that are still to be applied to a channel, by the beginning of their properties' names.
+    """The kinds of scales still to be applied to a channel, by the prefixes of their properties' names.
 
     npTDMS takes a polynomial without a size for one of four coefficients: they are counted here.
     """
@@ -100,7 +100,7 @@ def _scaled(channel: Any, scales: Mapping[str, str]) -> NDArray[Any]:
 
 
 def _stated(properties: Mapping[str, Any]) -> dict[str, float | str]:
-    """What a file, a group or a channel states, but for the waveform's own properties."""
+    """The properties of a file, a group or a channel, without those of the waveform."""
     return {
         str(name): value
         for name, value in properties.items()

@@ -78,8 +78,8 @@ Open = Callable[[], AbstractContextManager[ByteSource]]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Form:
-    """How the text is written: encoding, separator (" ", "  ": at least so many blanks), its first rows, their lines from 1,
-    and the table in them."""
+    """The format of a text: encoding, separator (" ", " ": at least as many blanks), its first rows, their lines from
+    1, and the table in them."""
 
     encoding: str
     separator: str
@@ -94,8 +94,8 @@ class _Form:
 
 
 def read_text(opened: Open, reading: Reading, limits: Limits, *, any_encoding: bool = False) -> Table:
-    """The table of a text, which is UTF-8, UTF-16 or Western, or of another encoding if the caller names its titles or takes
-    `any_encoding`. Raises InvalidError where it has no titles, or its lines are no text."""
+    """The table of a text in UTF-8, UTF-16 or a Western encoding, or in another if the caller names its titles or
+    allows `any_encoding`. Raises InvalidError where it has no titles, or its lines are no text."""
     with opened() as source:
         first = source.read(_HEAD)
     whole = len(first) < _HEAD
@@ -123,7 +123,7 @@ def read_text(opened: Open, reading: Reading, limits: Limits, *, any_encoding: b
 
 
 def _unmarked(opened: Open) -> bytes | None:
-    """The lines of a text in HTML or XML; None where it is none. Raises TooLargeError."""
+    """The lines of the tables in an HTML or XML text; None for any other text. Raises TooLargeError."""
     with opened() as source:
         content = source.read(_MOST_MARKED + 1)
     text = content.decode(_encodings(content, any_encoding=False)[0].replace("utf-8", "utf-8-sig"), "replace")
@@ -188,13 +188,13 @@ def _blocks(source: ByteSource, encoding: str) -> Iterator[_Block]:
 
 
 def _narrow(text: str) -> str:
-    """A text with its digits of full width, as East Asian keyboards write them, and the signs of numbers as plain ones."""
+    """A text with full-width digits (East Asian keyboards) and signs of numbers replaced by plain ones."""
     return text.translate(_NARROW) if not text.isascii() and _WIDE.search(text) else text
 
 
 def _zeros_to_the_end(tail: str, following: bytes, source: ByteSource) -> int:
-    """How many zero bytes a text ends in, as a logger leaves that allots its file in blocks; 0 where anything comes after
-    them."""
+    """The number of zero bytes at the end of a text, left by loggers that allocate files in blocks; 0 if anything
+    follows them."""
     count, stripped = len(tail), tail.strip("\0\r\n")
     while following and not stripped:
         count += len(following)
@@ -203,7 +203,7 @@ def _zeros_to_the_end(tail: str, following: bytes, source: ByteSource) -> int:
 
 
 def _zeros_amid(line: int, tail: str) -> InvalidError:
-    """The error of zero bytes with something after them; `line` has the first of them."""
+    """The error for zero bytes in the middle of a text; `line` has the first of them."""
     count = len(tail) - len(tail.lstrip("\0"))
     if BINARY.search(tail.encode("utf-8", "replace")):
         rule = "begins binary data, which is no text: in the program that wrote the file, export it as text"
@@ -216,7 +216,7 @@ def _zeros_amid(line: int, tail: str) -> InvalidError:
 
 
 def _encodings(head: bytes, *, any_encoding: bool) -> list[str]:
-    """The encodings that a text may be in, likeliest first."""
+    """The possible encodings of a text, likeliest first."""
     if wide := utf_16(head):
         return [wide]
     if _decodes(head, "utf-8"):
@@ -238,7 +238,7 @@ def _decodes(head: bytes, encoding: str) -> bool:
 
 
 def _form(first: bytes, reading: Reading, limits: Limits, *, any_encoding: bool) -> _Form:
-    """The encoding, the separator and the table by which most titles are known."""
+    """The encoding, the separator and the table by which most titles are recognised."""
     best: _Form | None = None
     named = named_columns(reading)
     unfit: list[list[str]] = []
@@ -269,7 +269,7 @@ def _lines(block: bytes, encoding: str) -> list[str]:
 
 
 def _turned(first: bytes, reading: Reading) -> bytes | None:
-    """A whole text whose lines are channels with its lines as columns, by the separator by which it is a table then."""
+    """A complete text with one channel per line, transposed, if a separator makes it a table; else None."""
     text = _lines(first, _encodings(first, any_encoding=False)[0])[reading.skip_rows :]
     for separator in _separators(text):
         rows = [cells for _, cells, _ in _rows(text, separator) if any(cells)]
@@ -282,7 +282,7 @@ def _turned(first: bytes, reading: Reading) -> bytes | None:
 
 
 def _separators(lines: Sequence[str]) -> list[str]:
-    """The separators that are tried: the one that the text names, or all that it holds."""
+    """The separators to try: the one that the text names, or all that it contains."""
     lines = lines[:MAX_ROWS]
     if stated := next(filter(None, map(_SEPARATOR_LINE.fullmatch, lines)), None):
         return [stated[1] or "\t"]
@@ -308,7 +308,7 @@ def _rows(lines: Sequence[str], separator: str, skipped: int = 0) -> Iterator[tu
 
 
 def _is_comment(line: str, separator: str) -> bool:
-    """Whether a line is a comment; a semicolon begins one where it does not separate."""
+    """Whether a line is a comment; a semicolon begins one unless it is the separator."""
     if line[:1].isdigit():
         return False
     bare = line.lstrip().lstrip('"')
@@ -345,7 +345,7 @@ def is_whole(cell: str, others: Sequence[str]) -> bool:
 
 
 def wrong_line(line: int, rule: str, code: str, got: str = "") -> InvalidError:
-    """The error of a line that cannot be part of a table; `line` counts from 1."""
+    """The error for a line that cannot be part of a table; `line` counts from 1."""
     shown = got[:MAX_QUOTED]
     message = f"line {line} {rule}" + (f", got {shown!r}" if got else "")
     return InvalidError.of(message, code=code, value=shown)
@@ -450,7 +450,7 @@ class _DataBody:
                     yield block._replace(text=block.text[start:])
 
     def _without_cut_line(self, block: str, channels: Mapping[int, str]) -> str:
-        """The last block without its last line where that has no line feed and may have been cut within a value."""
+        """The last block without its last line, if that has no line feed and may be cut within a value."""
         start = block.rfind("\n", 0, -1) + 1
         line = block[start:-1]
         cells = _cells(line, self._separator)
@@ -469,7 +469,7 @@ class _DataBody:
         return block[:start]
 
     def _settle(self, channels: Mapping[int, str]) -> None:
-        """Learn the decimal sign from the first cell that can be read in one way; a full stop where no cell has a sign."""
+        """Learn the decimal sign from the first unambiguous cell; a full stop if no cell has a sign."""
         doubtful = quoted = False
         for block, *_ in self._blocks():
             if self._numerals.decimal:
@@ -487,7 +487,7 @@ class _DataBody:
         self._numerals.decimal = self._numerals.decimal or ("" if doubtful and not comma else ".")
 
     def _plain(self, block: str, channels: Mapping[int, str]) -> list[NDArray[Any]] | None:
-        """The columns of a block of nothing but numbers: plain ones eight digits at a time, others by jiter (pydantic-core's
+        """The columns of a block of numbers alone: plain ones eight digits at a time, others by jiter (pydantic-core's
         reader of JSON); None for any other block."""
         separator, decimal = self._separator, self._numerals.decimal
         if not decimal or (separator != "," and decimal == "." and "," in block):
@@ -516,7 +516,8 @@ class _DataBody:
         return _rows(block.split("\n")[:-1], self._separator)
 
     def _even(self, block: str) -> list[str] | None:
-        """The cells of a block without words, with a line feed after each row, where all rows have as many; else None."""
+        """The cells of a block without words, if all rows end in a line feed and have the same number of cells; else
+        None."""
         separator, width = self._separator, self._width
         empty = f"\n{separator * (width - 1)}\n"
         if not separator.strip() or _WORDS.search(block) or "//" in block or empty in f"\n{block}":
@@ -552,8 +553,8 @@ class _DataBody:
         return self._numerals.values(channels, columns, self.line_of, self.rows)
 
     def _fit(self, cells: list[str], channels: Mapping[int, str]) -> bool:
-        """Whether a row has all that most rows have: empty cells at its end are added, or taken off. One that is shorter may
-        lack any of its cells, and the last one may be cut."""
+        """Make a row as wide as the table, by adding or removing empty cells at its end; false if it cannot be. A row
+        that is shorter than most may lack any of its cells, and the last row may be cut."""
         while len(cells) > self._width and not cells[-1]:
             cells.pop()
         if len(cells) > max(*channels, self._usual_width - 1):

@@ -18,7 +18,7 @@ class Conversion:
     offset: float = 0.0
 
     def is_identity(self) -> bool:
-        """Whether values stay as they are, bit for bit."""
+        """Whether values are unchanged, bit for bit."""
         return self.factor == 1.0 and self.offset == 0.0
 
     def apply(self, values: FloatArray) -> None:
@@ -35,7 +35,8 @@ _NEWTON_METRES_PER_POUND_FOOT = 1.3558179483314004
 
 
 def _spelled(by_factor: Mapping[float, str], offset: float = 0.0) -> dict[str, Conversion]:
-    """Factor -> its spellings apart by blanks. Capitals, dots and dashes need no spelling of their own."""
+    """The conversions by unit spelling; `by_factor` holds texts of spellings separated by blanks. Capitals, dots and
+    dashes need no spelling of their own."""
     return {unit: Conversion(factor, offset) for factor, units in by_factor.items() for unit in units.split()}
 
 
@@ -98,8 +99,9 @@ _FOREIGN = (
 
 
 def _key(unit: str) -> str:
-    """What the spellings of a unit have in common: plain characters for wide or raised ones, no capitals, none of blanks,
-    dots, signs of multiplication, dashes, carets, underscores and brackets. Empty where nothing is left, or for no unit.
+    """The common form of a unit's spellings: plain characters for wide or raised ones, lower case, without blanks,
+    dots, multiplication signs, dashes, carets, underscores and brackets. Empty for an empty unit or one too long to be
+    a unit.
 
     A capital is kept where it tells units apart: K and k; MPa and mPa, MNm and mNm.
     """
@@ -155,6 +157,6 @@ def is_unit(text: str) -> bool:
 
 
 def spellings(channel: str) -> str:
-    """Examples of the units that a channel may be in, for a message."""
+    """Examples of a channel's units, for a message."""
     examples = ["s, ms, min", "bar, mbar, MPa, kPa, Pa, psi", "rpm, 1/min, rad/s", "Nm, N·m, kNm", "°C, degC, K, °F"]
     return dict(zip(UNITS, examples, strict=True))[CHANNELS[channel].unit]

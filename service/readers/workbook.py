@@ -80,7 +80,7 @@ def _rows(book: CalamineWorkbook, sheet: str, path: Path | None) -> tuple[list[S
 
 
 def _trimmed(row: Sequence[Any]) -> Sequence[Any]:
-    """A row without the empty cells at its end, which other rows of the sheet make."""
+    """A row without the empty cells at its end, which only other rows of the sheet need."""
     end = len(row)
     while end and row[end - 1] in ("", None):
         end -= 1

@@ -21,15 +21,15 @@ _WORTH_READING = re.compile(rb"hidden=|t=[\"']e[\"']|<(?:\w+:)?f[ >/]|visibility
 
 @dataclass(slots=True)
 class SheetCells:
-    """Of one sheet, rows and columns from 0: the `hidden` rows, and `texts` in place of values: an error's name, or with `=`
-    before it a formula that no program has computed."""
+    """Facts about one sheet's cells, rows and columns from 0: the `hidden` rows, and `texts` for cells without a value:
+    an error's name, or `=` and a formula not yet computed."""
 
     hidden: set[int] = field(default_factory=set)
     texts: dict[tuple[int, int], str] = field(default_factory=dict)
 
 
 def sheet_cells(path: Path, sheet: str) -> SheetCells:
-    """What an XLSX or ODS file says of a sheet."""
+    """The hidden rows and the error and formula texts of a sheet in an XLSX or ODS file."""
     with zipfile.ZipFile(path) as archive:
         names = archive.namelist()
         if "content.xml" in names:
@@ -82,7 +82,7 @@ def _part_of(archive: zipfile.ZipFile, sheet: str) -> str:
 
 @contextmanager
 def _worth_reading(archive: zipfile.ZipFile, part: str) -> Iterator[IO[bytes] | None]:
-    """A part of an archive from its beginning; None where it holds nothing that is looked for, which is cheap to see."""
+    """A part of an archive from its beginning; None if a cheap search finds nothing relevant in it."""
     with archive.open(part) as file:
         last, worth = b"", False
         while not worth and (block := file.read(_BLOCK)):
@@ -133,7 +133,7 @@ def _xlsx(archive: zipfile.ZipFile, part: str) -> SheetCells:
 
 
 def _column(place: str) -> int:
-    """The column of a cell's name, from 0: 27 of `AB3`."""
+    """The column number in a cell's name, from 0: 27 for `AB3`."""
     number = 0
     for letter in place.rstrip("0123456789"):
         number = 26 * number + ord(letter) - ord("A") + 1

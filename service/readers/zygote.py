@@ -30,7 +30,7 @@ _FIXED = {
 
 
 class Zygote:
-    """One such process, and the parent's end of its socket. It serves one file at a time."""
+    """A zygote process, and the parent's end of its socket. It serves one file at a time."""
 
     def __init__(self, environment: Mapping[str, str]) -> None:
         self._socket, theirs = socket.socketpair()
@@ -46,9 +46,10 @@ class Zygote:
             )
 
     def run(self, request: Mapping[str, Any], result: BinaryIO, seconds: float) -> int:
-        """How the child ended that reads a file: its status, or minus a signal; the zygote's own end where it has ended.
+        """Read a file in a child process; returns the child's exit status (minus a signal), or the zygote's own if that
+        has ended.
 
-        Raises TimeoutError where it takes longer; then the child is ended.
+        Raises TimeoutError if it takes longer, after killing the child.
         """
         child = 0
         try:
@@ -76,11 +77,11 @@ class Zygote:
         return int(_NUMBER.unpack(held)[0])
 
     def alive(self) -> bool:
-        """Whether it can be given a file."""
+        """Whether it can accept a file."""
         return self._process.poll() is None
 
     def end(self, *, kill: bool = False) -> int:
-        """Have it end; how it did."""
+        """End the zygote; returns its exit status."""
         self._socket.close()
         if kill:
             self._process.kill()
@@ -92,7 +93,7 @@ _idle: list[tuple[dict[str, str], Zygote]] = []
 
 
 def run(request: Mapping[str, Any], result: BinaryIO, seconds: float) -> int:
-    """Read a file in a child of a zygote: one that waits, else a new one. As `Zygote.run`."""
+    """Read a file in a child of an idle zygote, or of a new one; returns as `Zygote.run`."""
     environment = {name: os.environ[name] for name in _ENVIRONMENT if name in os.environ} | _FIXED
     zygote = _taken(environment) or Zygote(environment)
     ended = zygote.run(request, result, seconds)
@@ -117,7 +118,8 @@ def _end_all() -> None:
 
 
 def serve(control: socket.socket, load: Callable[[Any], None], read: Callable[[Any, int], None]) -> None:
-    """In the zygote: `load` what each request needs, and `read` it in a child, until the parent closes the socket."""
+    """The zygote's loop: `load` the module for each request, and `read` the file in a child, until the parent closes
+    the socket."""
     while True:
         head, files, *_ = socket.recv_fds(control, _NUMBER.size, 1)
         if not head:

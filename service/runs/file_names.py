@@ -37,7 +37,7 @@ _LEAST_UNNAMED = 100
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Suggested:
-    """What is suggested of a run, and by which pattern or labels a profile finds it."""
+    """Suggestions for a run's kind, cycles and clutch, and the pattern or labels with which a profile finds them."""
 
     named: Named
     file_name: str | None = None
@@ -46,7 +46,7 @@ class Suggested:
 
 
 def suggested(filename: str, beside: Sequence[str], cells: Mapping[str, str]) -> Suggested:
-    """What a file's name, `beside` those that came with it, and the cells above its table say of its run."""
+    """Suggestions from a file's name, the names `beside` it, and the cells above its table."""
     name = PurePath(filename).name
     clutch_cell = label_of("clutch", cells)
     clutch_id = cells[clutch_cell] if clutch_cell and _IDENTIFIER.fullmatch(cells[clutch_cell]) else None
@@ -65,7 +65,7 @@ def suggested(filename: str, beside: Sequence[str], cells: Mapping[str, str]) ->
 
 
 def kind_in(filename: str) -> FileKindName | None:
-    """The kind of run that a name says; None where it leaves a doubt."""
+    """The kind of run stated by a name; None if it is ambiguous."""
     stem = _stem(filename)
     dynamic = re.search("dyn|loop", stem, re.IGNORECASE) is not None
     stationary = re.search("stat|sweep", stem, re.IGNORECASE) is not None
@@ -80,7 +80,7 @@ def _stem(filename: str) -> str:
 
 
 def cycles_of_all(filename: str, beside: Sequence[str]) -> float | None:
-    """The cycles in a name: those that its words say, or the number that changes among the names that came with it."""
+    """The cycles stated by words in a name, or the number that differs between the names sent together."""
     alone = cycles_in(filename)
     if alone is not None or not beside:
         return alone
@@ -95,7 +95,7 @@ def cycles_of_all(filename: str, beside: Sequence[str]) -> float | None:
 
 
 def _are_cycles(values: Sequence[float | None]) -> bool:
-    """Whether numbers of files may be cycles: whole, each another, and not one after the other as files are counted."""
+    """Whether numbers in file names may be cycles: whole, all different, and not consecutive like file numbers."""
     known = sorted(value for value in values if value is not None)
     if len(known) < len(values) or len(set(known)) < len(known):
         return False
@@ -103,7 +103,7 @@ def _are_cycles(values: Sequence[float | None]) -> bool:
 
 
 def cycles_in(filename: str) -> float | None:
-    """The cycles that a name alone says; None where it leaves a doubt."""
+    """The cycles stated by a name alone; None if it is ambiguous."""
     found = [
         (match[0], match.start(), match.end()) for match in re.finditer(r"[A-Za-z]+|\d+(?:\.\d+)?", _stem(filename))
     ]
@@ -117,7 +117,7 @@ def cycles_in(filename: str) -> float | None:
 
 
 def _only_number(stem: str) -> float | None:
-    """The one number of a name without its clutch's id, where it may be cycles."""
+    """The only number in a name without its clutch's id, if it may be cycles."""
     numbers = re.findall(r"(?<![A-Za-z.])\d+k?(?![A-Za-z.])", stem, flags=re.IGNORECASE)
     value = count(numbers[0]) if len(numbers) == 1 else None
     return value if value is not None and _is_count(value) else None
@@ -128,7 +128,7 @@ def _is_count(value: float) -> bool:
 
 
 def _number_at(found: Sequence[tuple[str, int, int]], at: int) -> tuple[float, str]:
-    """A number of a name, and which word beside it says what it counts."""
+    """A number in a name, and its meaning by the words beside it."""
     text, start, end = found[at]
     before, before_end = (found[at - 1][0], found[at - 1][2]) if at else ("", -1)
     thousands = at + 1 < len(found) and found[at + 1][1] == end and found[at + 1][0].lower() == "k"
@@ -149,7 +149,7 @@ def _number_at(found: Sequence[tuple[str, int, int]], at: int) -> tuple[float, s
 
 
 def _clutch(name: str, cycles: float | None) -> str | None:
-    """The one part of a name that may be a clutch's id; None where none is, or several are."""
+    """The only part of a name that may be a clutch's id; None if there is none or there are several."""
     ids = [match[0] for match in _ID.finditer(_stem(name)) if not _COUNTER.match(match[0])]
     ids = [own for own in ids if cycles is None or count(re.sub(r"^\D+", "", own)) != cycles]
     return ids[0] if len(ids) == 1 else None

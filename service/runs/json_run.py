@@ -46,7 +46,7 @@ _KINDS = ("stationary_stribeck", "dynamic_stribeck", "duty_cycles", "run_in", "m
 
 
 def read_run(body: bytes) -> IncomingRun:
-    """The run in a JSON body; raises InvalidError naming every place that is wrong."""
+    """The run in a JSON body; raises InvalidError naming every wrong place."""
     return _parsed(body, _run)
 
 
@@ -77,17 +77,18 @@ def _run(sent: Any) -> IncomingRun:
 
 
 def read_run_on_disk(path: Path) -> IncomingRun:
-    """Read a run from a body that was kept as a file while it waited."""
+    """The run in a JSON body that was kept on disk while it waited."""
     return read_run(path.read_bytes())
 
 
 def checked(schema: type[Body], body: bytes) -> Body:
-    """Any other JSON body as its schema has it; raises InvalidError naming every place that is wrong."""
+    """Any other JSON body, checked by its schema; raises InvalidError naming every wrong place."""
     return _parsed(body, partial(_validated, schema.model_validate_json, items=MAX_MARKS))
 
 
 def _parsed(body: bytes, read: Callable[[Any], Answer]) -> Answer:
-    """What `read` makes of the body's value, in memory of some ten times its size. Raises InvalidError."""
+    """The result of `read` for the body's parsed value; needs memory of about ten times the body's size. Raises
+    InvalidError."""
     body = _in_utf8(body)
     if sum(map(body.count, (b'"', b"[", b"{"))) > MAX_MARKS:
         raise _too_many_marks(body, read)
@@ -104,9 +105,9 @@ def _parsed(body: bytes, read: Callable[[Any], Answer]) -> Answer:
 
 
 def _too_many_marks(body: bytes, read: Callable[[Any], object]) -> InvalidError:
-    """The error of a body with more names, texts and lists than any that is right: what is wrong with its beginning.
+    """The error for a body with more names, texts and lists than any valid one: the errors of its beginning.
 
-    A value in memory is some fifty bytes, whether the body spends two on it or twenty: such a body is not parsed whole.
+    Such a body is not parsed as a whole: each value takes some fifty bytes of memory, even if it takes two in the body.
     """
     try:
         end = next(islice(re.finditer(rb'["\[{]', body), MAX_MARKS, None)).start()
@@ -126,7 +127,7 @@ def _too_many_marks(body: bytes, read: Callable[[Any], object]) -> InvalidError:
 
 
 def _check_channels(sent: Any) -> None:
-    """Raise InvalidError where a channel's values are no numbers."""
+    """Raise InvalidError if a channel's values are not numbers."""
     channels = sent.get("channels") if isinstance(sent, dict) else None
     for name, values in channels.items() if isinstance(channels, dict) else ():
         if name in CHANNELS and isinstance(values, list):
@@ -148,7 +149,7 @@ def _in_utf8(body: bytes) -> bytes:
 
 
 def _require_utf8(body: bytes) -> None:
-    """Raise InvalidError where the body is not UTF-8 throughout."""
+    """Raise InvalidError if the body is not valid UTF-8."""
     try:
         body.decode()
     except UnicodeDecodeError as error:
@@ -163,10 +164,10 @@ def _encoding_error(why: str) -> InvalidError:
 
 
 def _validated(validate: Callable[[bytes], Answer], sent: object, items: int = _MAX_SHOWN) -> Answer:
-    """The sent value by its schema, texts cut, and names and lists after so many `items`: of a run these are channels, whose
-    values `check_columns` reads.
+    """The sent value checked by its schema, with texts cut, and objects and lists cut after `items` entries; a run's
+    channels are read by `check_columns` instead.
 
-    pydantic copies whatever is wrong, with all that it holds, once an error.
+    pydantic copies each wrong value with all its content once per error.
     """
     try:
         return validate(pydantic_core.to_json(_cut(sent, items), inf_nan_mode="constants"))
@@ -183,7 +184,7 @@ def _cut(value: Any, items: int) -> Any:
 
 
 def _invalid(error: pydantic.ValidationError) -> InvalidError:
-    """pydantic's errors as the service's: pointer, row, value, rule."""
+    """pydantic's errors as the service's InvalidError, with pointer, row, value and rule."""
     details = error.errors(include_url=False, include_context=False)
     errors = [_field_error(item["loc"], item["type"], item["msg"], item["input"]) for item in details[:MAX_ERRORS]]
     more = f"; {len(details)} errors in all" if len(details) > 1 else ""
@@ -191,8 +192,8 @@ def _invalid(error: pydantic.ValidationError) -> InvalidError:
 
 
 def _field_error(loc: tuple[int | str, ...], code: str, rule: str, value: object) -> FieldError:
-    """One of pydantic's errors as ours. pydantic puts the run's kind before the place, and it is no part of the body's path;
-    rows count from 1."""
+    """One of pydantic's errors as the service's FieldError. pydantic puts the run's kind before the place, and it is no
+    part of the body's path; rows count from 1."""
     place = loc[1:] if loc and loc[0] in _KINDS else loc
     if code.startswith("union_tag"):
         place = (*place, "kind")

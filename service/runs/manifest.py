@@ -37,19 +37,19 @@ _RECORDS = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunFile:
-    """A file to send and the parameters that the manifest has for it; None for JSON and for a record that is not listed."""
+    """A file to send, with its parameters from the manifest; None for JSON and for a file that is not listed."""
 
     path: Path
     parameters: Mapping[str, str] | None = None
 
     @property
     def is_inspection(self) -> bool:
-        """Whether it is an inspection's: JSON in a folder of them."""
+        """Whether the file is an inspection: JSON in a folder of inspections."""
         return self.path.suffix == ".json" and self.path.absolute().parent.name == INSPECTIONS
 
 
 def write(path: Path, body: Mapping[str, Any] | Sequence[Mapping[str, Any]]) -> None:
-    """One body into one file, whole or not at all."""
+    """Write a body into a file atomically: the file is complete or absent."""
     partial = path.with_suffix(path.suffix + ".part")
     partial.write_text(json.dumps(body, allow_nan=False, separators=(",", ":")) + "\n", encoding="utf-8")
     partial.replace(path)
@@ -144,13 +144,13 @@ def _entry(manifest: Path, index: int, entry: object) -> tuple[Path, dict[str, s
 
 
 def _require_within(folder: Path, file: Path, at: str) -> None:
-    """Raise ValueError where a file, its links followed, does not lie below the folder."""
+    """Raise ValueError if a file, with links followed, is not below the folder."""
     if not file.resolve().is_relative_to(folder.resolve()):
         raise ValueError(f"{at}: {file} lies outside the folder {folder} and is not sent")
 
 
 def _cycles(path: Path) -> float:
-    """The cycles in a JSON run, for sorting only; a file that is no run comes last, and the service refuses it."""
+    """The cycles in a JSON run, for sorting only; a file that is no run comes last, and the service will refuse it."""
     try:
         body = json.loads(path.read_bytes())
     except (ValueError, RecursionError):

@@ -21,7 +21,7 @@ _GROUP = "rig"
 
 
 class RecordFormat(StrEnum):
-    """The formats that are written, by their names on the command line; JSON holds the whole run."""
+    """The formats that can be written, by their names on the command line; JSON holds the complete run."""
 
     JSON = "json"
     CSV = "csv"
@@ -38,14 +38,14 @@ _NEEDING = {RecordFormat.TDMS: Format.TDMS, RecordFormat.MDF4: Format.MDF4}
 
 
 def require_writer(kind: RecordFormat) -> None:
-    """Raises ValueError where the package that writes a format is not installed; names the extra that installs it."""
+    """Raise ValueError, naming the extra to install, if the package that writes a format is missing."""
     needed = _NEEDING.get(kind)
     if needed and (missing := not_installed(needed, f"{needed} files cannot be written")):
         raise ValueError(missing)
 
 
 def write_record(path: Path, kind: RecordFormat, channels: Mapping[str, FloatArray], head: Mapping[str, Any]) -> None:
-    """Channels [n] by public name into one file, CSV, TDMS or MDF4, whole or not at all; `head` goes in as comment or
+    """Write channels [n] by public name into one CSV, TDMS or MDF4 file, atomically; `head` becomes its comment or
     properties. Raises ValueError where the package of the format is not installed.
     """
     require_writer(kind)
@@ -55,7 +55,7 @@ def write_record(path: Path, kind: RecordFormat, channels: Mapping[str, FloatArr
 
 
 def _write_csv(path: Path, channels: Mapping[str, FloatArray], head: Mapping[str, Any]) -> None:
-    """The shortest decimals that give the same doubles; a comment line before the header."""
+    """Write CSV with the shortest decimals that give the same doubles, and a comment line before the header."""
     columns = list(channels.values())
     with path.open("w", encoding="utf-8", newline="\n") as file:
         file.write("# " + ", ".join(f"{name} {value}" for name, value in head.items()) + "\n")
@@ -76,7 +76,7 @@ def _write_tdms(path: Path, channels: Mapping[str, FloatArray], head: Mapping[st
 
 
 def _write_mdf4(path: Path, channels: Mapping[str, FloatArray], head: Mapping[str, Any]) -> None:
-    """With time as the master channel; plateaus, which have no time, by their number."""
+    """Write MDF4 with time as the master channel; plateaus, which have no time, are numbered."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # asammdf's own imports warn
         from asammdf import MDF, Signal  # start-up time, optional package

@@ -30,7 +30,7 @@ _NUMBER = re.compile(r"\d+(?:[.,' ]\d{3})*")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Named:
-    """What a file says of its run besides the table; None where it says nothing."""
+    """The facts that a file states about its run outside of the table; None if not stated."""
 
     kind: FileKindName | None = None
     cycles: float | None = None
@@ -39,7 +39,7 @@ class Named:
 
 
 def require_usable(profile: RigProfile) -> None:
-    """Raise InvalidError where a unit is none of its channel or the pattern of names cannot be used."""
+    """Raise InvalidError if a unit does not fit its channel or the pattern of names cannot be used."""
     for number, column in enumerate(profile.columns):
         if column.channel and column.unit and conversion(column.channel, column.unit) is None:
             allowed = spellings(column.channel)
@@ -62,7 +62,7 @@ def require_usable(profile: RigProfile) -> None:
 
 
 def named(profile: RigProfile, filename: str, cells: Mapping[str, str]) -> Named:
-    """What the profile finds in the file's name and in the cells above its table (`label` -> what stands beside it)."""
+    """The facts that the profile finds in the file's name and in the cells above its table (label -> text beside it)."""
     groups: Mapping[str, str | None] = {}
     if profile.file_name is not None:
         match = _regex(profile.file_name).fullmatch(PurePath(filename).name)
@@ -82,7 +82,7 @@ def named(profile: RigProfile, filename: str, cells: Mapping[str, str]) -> Named
 
 
 def _beside(label: str, cells: Mapping[str, str]) -> str | None:
-    """What stands beside a label above the table."""
+    """The text beside a label above the table."""
     texts = {_bare(own): text for own, text in cells.items()}
     return texts.get(_bare(label))
 
@@ -92,10 +92,10 @@ def _bare(label: str) -> str:
 
 
 def pattern_for(filename: str, cycles: float | None, clutch_id: str | None = None) -> str | None:
-    """A pattern of names such as this one: the cycles and the clutch where they stand in it once, and `*` for every other
-    number.
+    """A pattern that matches names like this one: the cycles and the clutch as fields, if each occurs once, and `*` for
+    every other number.
 
-    None where the cycles are not in the name.
+    None if the cycles are not in the name.
     """
     if cycles is None or not cycles.is_integer():
         return None
@@ -117,8 +117,8 @@ def pattern_for(filename: str, cycles: float | None, clutch_id: str | None = Non
 
 
 def _regex(pattern: str) -> re.Pattern[str]:
-    """The pattern as a regular expression. Between two `*` the first place where a text stands is the only one to be tried,
-    for the second `*` takes the rest: else a name is looked through with the power of their number."""
+    """The pattern as a regular expression. Between two `*` only the first occurrence of a text is tried, because the
+    second `*` matches the rest; otherwise matching would take exponential time."""
     pattern = re.sub(r"\*+", "*", pattern)
     texts, wilds = _WILD.split(pattern), _WILD.findall(pattern)
     parts = [re.escape(texts[0])]
@@ -129,7 +129,7 @@ def _regex(pattern: str) -> re.Pattern[str]:
 
 
 def count(text: str | None) -> float | None:
-    """A whole number of cycles, with thousands grouped or as `7k`; None where the text is none."""
+    """A whole number of cycles, with grouped thousands or as `7k`; None if the text is no such number."""
     plain = (text or "").strip()
     times = 1000.0 if plain[-1:].casefold() == "k" else 1.0
     plain = plain[:-1] if times > 1 else plain
@@ -140,7 +140,7 @@ def count(text: str | None) -> float | None:
 
 
 def fits(profile: Mapping[str, Any], titles: Collection[str]) -> bool:
-    """Whether a file has the columns of a stored profile and no others, whatever their case and blanks."""
+    """Whether a file has exactly the columns of a stored profile, ignoring case and blanks."""
     own = [column["title"] for column in profile["columns"] if not column["title"].startswith("=")]
     return {_plain(title) for title in own} == {_plain(title) for title in titles}
 

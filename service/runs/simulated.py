@@ -37,7 +37,8 @@ def simulated_head(run: SimulatedRun) -> dict[str, object]:
 
 
 def simulated_channels(run: SimulatedRun) -> dict[str, FloatArray]:
-    """The channels [n] of a simulated run by public name, in their units, to nine digits; empty where it has none."""
+    """The channels [n] of a simulated run by public name, in their units, to nine digits; empty for a run without
+    channels."""
     data = run.record if run.record is not None else run.plateaus
     if data is None:
         return {}
@@ -56,7 +57,8 @@ def simulated_body(run: SimulatedRun) -> dict[str, object]:
 
 
 def simulated_inspection(surface: Surface, cycles: float) -> dict[str, object]:
-    """The JSON body of an inspection of a simulated clutch after so many cycles, to three digits as a profilometer's."""
+    """The JSON body of an inspection of a simulated clutch after this many cycles, to three digits as from a
+    profilometer."""
     roughness = float(f"{surface.roughness * _MICROMETRES_PER_METRE:.3g}")
     return {
         "cycles": cycles,
@@ -80,7 +82,7 @@ def _columns(data: Plateaus | Record) -> dict[str, FloatArray | None]:
 
 
 def _from_si(name: str, column: FloatArray) -> FloatArray:
-    """In the channel's unit, to nine digits: every value is the double nearest to its decimal."""
+    """Values converted to the channel's unit and rounded to nine digits, each the double nearest to its decimal."""
     channel = CHANNELS[name]
     values = (column - channel.offset) / channel.factor
     size = np.floor(np.log10(np.maximum(np.abs(values), 1e-9))).astype(np.int64)
@@ -102,7 +104,7 @@ _LISTS = ("pressures_bar", "speeds_rpm")
 
 
 def planned_tests(path: Path, alternative: int) -> list[PlannedTest]:
-    """The steps of one of a plan's alternatives, from 1. Raises ValueError that names what is wrong, OSError."""
+    """The steps of one alternative of a plan, counted from 1. Raises ValueError naming the fault, OSError."""
     text = path.read_text(encoding="utf-8-sig")
     tests = _steps_from_json(path, text) if text.lstrip().startswith("{") else _steps_from_csv(text)
     if not tests:

@@ -40,8 +40,8 @@ def suggestion_of(
     beside: Sequence[str] = (),
     why: str = "",
 ) -> Suggestion | None:
-    """How a file may be read; None where nothing is found that gives a test. `beside`: names of files that came with it;
-    `why`: what keeps it from being read.
+    """A suggested way to read a file; None if none gives a test. `beside`: names of files sent with it; `why`: why it
+    could not be read.
     """
     try:
         proposal = suggest_file(path, filename=filename, reading=reading)
@@ -122,8 +122,8 @@ def _first_test(path: Path, filename: str, reading: Reading) -> Reading:
 
 
 def confirmed_profile(path: Path, rig: str, profile: RigProfile | None, **asked: Any) -> RigIn:
-    """The profile of a new rig: the one that was sent, or how a file was read by the arguments that `asked` holds, as
-    `suggestion_of` takes them. Raises InvalidError where the file gives no test by them."""
+    """The profile of a new rig: the one sent, or one made from the reading arguments `asked`, as in `suggestion_of`.
+    Raises InvalidError if the file gives no test by it."""
     if profile is None:
         suggestion = suggestion_of(path, **asked)
         if suggestion is None:
@@ -134,7 +134,7 @@ def confirmed_profile(path: Path, rig: str, profile: RigProfile | None, **asked:
 
 
 def _columns(reading: Reading, titles: Sequence[str]) -> list[RigColumn]:
-    """The columns of a reading, and those of the file that it leaves out."""
+    """The columns used by a reading, and the file's other columns."""
     chosen = {choice.column: (channel, choice.unit) for channel, choice in reading.mapping.items()}
     listed = [title for title in dict.fromkeys(titles) if title not in chosen]
     columns = [RigColumn.model_validate({"title": t, "channel": of, "unit": unit}) for t, (of, unit) in chosen.items()]
@@ -154,5 +154,5 @@ def _rows(read: Channels) -> list[dict[ChannelName, float]]:
 
 
 def _kind(columns: Mapping[str, FloatArray]) -> FileKindName:
-    """A record in which nothing stays as it is for a while is a dynamic one."""
+    """The kind of test by its record: dynamic if no stretch of it is constant for a while."""
     return "dynamic_stribeck" if "time_s" in columns and holds_no_dwell(columns) else "stationary_stribeck"

@@ -28,7 +28,8 @@ def read_file_run(
     profile: RigProfile | None = None,
     rig: str | None = None,
 ) -> IncomingRun:
-    """The run in a file, read by a profile, the stored one of `rig`, where one is given; what is given beside it wins.
+    """The run in a file, read by a profile or the saved one of `rig` if given; explicit arguments take precedence over
+    the profile.
 
     Raises InvalidError or TooLargeError naming what is wrong; without a profile the former has a suggestion, if there is
     one.
@@ -47,7 +48,7 @@ def read_file_run(
 
 
 def file_kind(kind: str) -> FileKindName:
-    """The kind of a stored run that was a file."""
+    """The kind of a stored run that was sent as a file."""
     return "dynamic_stribeck" if kind == "dynamic_stribeck" else "stationary_stribeck"
 
 
@@ -84,7 +85,7 @@ def _read_run(
 
 
 def reading_with(profile: RigProfile | None, reading: Reading) -> Reading:
-    """How a file is read by a profile; what `reading` says itself wins."""
+    """The reading of a file by a profile; settings of `reading` take precedence."""
     if profile is None:
         return reading
     choices: dict[str, ColumnChoice] = {

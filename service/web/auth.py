@@ -36,7 +36,7 @@ _VERSION_OF_PROXIES = "1.0"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Grant:
-    """What a caller may do, by its name in the audit trail: a key's id and note, or `local`.
+    """A caller's permissions, under its name in the audit trail: a key's id and note, or `local`.
 
     `clutches` is None if all are allowed, `key_id` is None if no key exists.
     """
@@ -54,7 +54,8 @@ _LOCAL_GRANT = Grant(name="local", scope="admin")
 def make_key(
     scope: Scope, note: str, *, created_at: str, clutches: Iterable[str] | None = None, days: float | None = None
 ) -> tuple[str, KeyRow]:
-    """A new secret, and the row that knows only its hash; bound to `clutches`, and expiring after so many days from now."""
+    """Create a key: returns its secret, and its row with only the secret's hash. The key is bound to `clutches` and
+    expires after that many days."""
     key_id, secret = secrets.token_hex(4), secrets.token_urlsafe(32)
     text = f"clutchlife_{key_id}_{secret}"
     row = KeyRow(
@@ -72,10 +73,11 @@ def make_key(
 def authorise(
     request: Request, snapshot: Snapshot, scope: Scope, clutch_id: str | None, *, narrowed: bool = False
 ) -> Grant:
-    """Let the caller pass and return what it may, or raise UnauthorizedError or ForbiddenError.
+    """Return the caller's grant if it may make this request. Raises UnauthorizedError or ForbiddenError.
 
-    `snapshot` is of the caller's key; `clutch_id` is the clutch that is asked about, None where it is all of them. A key
-    that is bound to clutches passes where it is one of them, or where the route itself keeps to them (`narrowed`).
+    `snapshot` has the caller's key; `clutch_id` is the requested clutch, None if the request is about all of them. A
+    key bound to clutches may be used for one of them, or on routes that filter by the key's clutches themselves
+    (`narrowed`).
     """
     grant = identify(request, snapshot)
     require_scope(grant, scope)
@@ -108,7 +110,7 @@ def _key_of(request: Request) -> str | None:
 
 
 async def snapshot_at(request: Request, clutch_id: str | None) -> Snapshot:
-    """The caller's key and the clutch's revision, read together, and kept with the request for whatever else needs them."""
+    """The caller's key and the clutch's revision, read in one look and kept with the request for later use."""
     key = _key_of(request)
     if clutch_id is not None and len(clutch_id) > LONGEST_IDENTIFIER:
         clutch_id = None  # no clutch is called so: the key is checked alone, and then there is no such clutch
@@ -131,13 +133,14 @@ def _grant(key: GrantedKey) -> Grant:
 
 
 def require_scope(grant: Grant, scope: Scope) -> None:
-    """Raise ForbiddenError where the scope is not among those granted."""
+    """Raise ForbiddenError if the grant does not include the scope."""
     if SCOPES.index(grant.scope) < SCOPES.index(scope):
         raise ForbiddenError(f"the key has the scope {grant.scope}, and this request needs {scope}")
 
 
 def require_clutch(grant: Grant, clutch_id: str | None) -> None:
-    """Raise ForbiddenError where the key is bound to other clutches; None: it is about all of them."""
+    """Raise ForbiddenError if the key is bound to other clutches; `clutch_id` is None if the request is about all
+    clutches."""
     if grant.clutches is not None and clutch_id not in grant.clutches:
         subject = "all clutches" if clutch_id is None else f"clutch {clutch_id[:80]!r}"
         raise ForbiddenError(f"the key is for certain clutches only, and this request is about {subject}")
@@ -195,7 +198,7 @@ def context_of(request: Request) -> Context:
 
 
 def allowed(scope: Scope, *, narrowed: bool = False) -> Callable[[Request], Awaitable[Context]]:
-    """A dependency that gives the context to callers whom `authorise` lets pass and stops the others."""
+    """A FastAPI dependency: returns the service's context if `authorise` allows the request, else raises its error."""
 
     async def check(request: Request) -> Context:
         context, clutch_id = context_of(request), clutch_of(request)
@@ -215,18 +218,19 @@ def clutch_of(request: Request) -> str | None:
 
 
 def route_of(request: Request) -> str:
-    """What logs and metrics call the request's address: its route's template, which says nothing that its path names."""
+    """The request's name in logs and metrics: the template of its route, so that no clutch or run of its path is
+    disclosed."""
     return getattr(request.scope.get("route"), "path", UNMATCHED)
 
 
 def grant_of(request: Request) -> Grant:
-    """What the sender of a request that was allowed may do."""
+    """The permissions of the sender of an authorised request."""
     grant: Grant = request.state.grant
     return grant
 
 
 def _refuse_unknown_arguments(request: Request) -> None:
-    """A mistyped argument must not be answered as if it had not been there."""
+    """Raise InvalidError if the query has an argument that the route does not know, such as a misspelt one."""
     if not request.scope["query_string"]:
         return
     arguments = {field.alias for field in query_fields(request.scope["route"])}
@@ -245,7 +249,7 @@ def _refuse_unknown_arguments(request: Request) -> None:
 
 
 def query_fields(route: Any) -> list[Any]:
-    """A route's arguments, those of what it depends on among them."""
+    """All query parameters of a route, including those of its dependencies."""
     parts = [route.dependant]
     for part in parts:
         parts += part.dependencies

@@ -23,7 +23,7 @@ Endpoint = TypeVar("Endpoint", bound=Callable[..., Any])
 
 
 class Takes(Enum):
-    """What a route takes as its body."""
+    """The kinds of request body that a route may accept."""
 
     SHORT = "JSON of a few fields"
     RUN = "a run as JSON, which waits on disk where it is long"
@@ -36,7 +36,7 @@ declared: dict[Callable[..., Any], Takes] = {}
 
 
 def takes(kind: Takes) -> Callable[[Endpoint], Endpoint]:
-    """Declare of a route's function what it takes as its body."""
+    """Decorator that states which kind of request body a route function accepts."""
 
     def declare(endpoint: Endpoint) -> Endpoint:
         declared[endpoint] = kind
@@ -56,14 +56,14 @@ async def parsed(schema: type[Content], body: bytes) -> Content:
 
 
 class Room:
-    """Bytes that requests may hold together."""
+    """A budget of bytes that requests share."""
 
     def __init__(self, most: int) -> None:
         self.left = most
         self._sharing: dict[int, int] = {}  # how many hold the same object, by its id
 
     def take(self, size: int) -> bool:
-        """Hold so many bytes more (fewer where negative), unless they have no room; whether they are held."""
+        """Reserve this many bytes (release them if negative); false, with nothing reserved, if they exceed the budget."""
         if size > self.left:
             return False
         self.left -= size
@@ -71,7 +71,8 @@ class Room:
 
     @contextmanager
     def sharing(self, content: bytes) -> Iterator[bool]:
-        """Hold an object's bytes inside, once for all who hold the same object; whether they have room."""
+        """Context that reserves an object's bytes, counted once for all its users; yields whether they fit into the
+        budget."""
         held = id(content) in self._sharing or self.take(len(content))
         if held:
             self._sharing[id(content)] = self._sharing.get(id(content), 0) + 1
@@ -87,18 +88,17 @@ class Room:
 
 @dataclass(frozen=True, slots=True)
 class Bound:
-    """Bytes that a body may have, and how many of them are in memory; the rest is on disk."""
+    """The maximum size of a body [bytes], and the part of it that is kept in memory; the rest is on disk."""
 
     most: int
     in_memory: int
 
 
 class Bodies:
-    """Refuses a body over the bytes that its route takes with 413, announced or grown so far, and one that takes longer than
-    `seconds`, and the time that its bytes so far may take, with 408.
+    """Limits request bodies: 413 if the body exceeds its route's size limit, announced or actual; 408 if it takes
+    longer than `seconds` plus the time allowed for its bytes so far; 503 if other bodies use all available room.
 
-    One for which the bodies that are here leave no room is refused with 503. It is read to its end first, and thrown away:
-    a sender hears of it only then.
+    A body refused with 503 is first read to its end and discarded: a sender reads the answer only then.
     """
 
     def __init__(self, app: ASGIApp, most: int, most_file: int, seconds: float) -> None:
@@ -159,7 +159,7 @@ class Bodies:
 
 
 class _RequestBody:
-    """The body of a request as far as it has arrived, and what it takes of the rooms by place."""
+    """The bytes received of one request's body, and its reservations in memory and on disk."""
 
     def __init__(self, rooms: Mapping[str, Room]) -> None:
         self.taken = 0
@@ -168,7 +168,7 @@ class _RequestBody:
         self._has_room = True
 
     def grow(self, size: int, in_memory: int) -> bool:
-        """Whether so many bytes more have room; what has none takes none any more."""
+        """Count more received bytes and reserve room for them; false, with all its room released, once there is none."""
         self.taken += size
         if self._has_room:
             needed = {"memory": min(self.taken, in_memory), "disk": max(0, self.taken - in_memory)}

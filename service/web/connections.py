@@ -45,8 +45,8 @@ _TOO_MANY_ARGUMENTS = (
 def bounded(
     most: int, head_seconds: float = HEAD_SECONDS, taken_seconds: float = TAKEN_SECONDS
 ) -> type[asyncio.Protocol]:
-    """uvicorn's protocol with `most` connections of one address, each request's head sent within `head_seconds`, what is
-    written of an answer taken within `taken_seconds`."""
+    """A class of uvicorn's HTTP protocol with limits: at most `most` connections per address; a request's head must
+    arrive within `head_seconds`, and the client must read written bytes of the response within `taken_seconds`."""
 
     class Bounded(HttpToolsProtocol):
         def __init__(self, config: Config, *arguments: Any, **more: Any) -> None:
@@ -151,12 +151,13 @@ def bounded(
                 self._end_parsing(*_HEAD_TOO_LARGE)
 
         def _end_parsing(self, status: http.HTTPStatus, text: str) -> NoReturn:
-            """Raise inside the parser, which then calls `send_400_response`."""
+            """Raise an error inside the parser, which then calls `send_400_response`."""
             self._wrong = status, text
             raise ValueError(text)
 
         def _refuse(self, status: http.HTTPStatus, text: str) -> None:
-            """Answer, where no answer has begun, and close later: closed with unread bytes, a socket loses the answer."""
+            """Send a refusal, unless a response has begun, and close later: a socket closed with unread bytes loses the
+            response."""
             if self._refused or self.transport.is_closing():
                 return
             self._refused = True
@@ -185,7 +186,7 @@ def bounded(
                 self.transport.close()
 
         def _cut_off(self) -> None:
-            """End the connection at once: closed in order, the system would keep what was not taken for minutes."""
+            """Abort the connection: closed in order, the system would keep unread bytes for minutes."""
             linger = struct.pack("ii", 1, 0)
             self.transport.get_extra_info("socket").setsockopt(SOL_SOCKET, SO_LINGER, linger)
             self.transport.abort()
@@ -204,6 +205,6 @@ def bounded(
 
 
 def allow_many() -> None:
-    """Let this process have as many files open as the system lets it: every connection is one."""
+    """Raise this process's limit of open files to the system's maximum: each connection needs one."""
     _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))

@@ -31,14 +31,15 @@ _log = logging.getLogger("clutchlife")
 
 
 class KeyUses:
-    """When each key was last used, noted once an hour: a commit costs more than a request. For the event loop alone."""
+    """Stores when each key was last used, at most once an hour: a commit costs more than a request. For the event loop
+    alone."""
 
     def __init__(self) -> None:
         self._due: dict[str, float] = {}
         self._storing: set[asyncio.Task[None]] = set()
 
     def note(self, database: Database, key_id: str) -> None:
-        """Have a use of the key stored, where the last one that was is an hour old; nobody waits for it."""
+        """Store that the key was used, unless a use was stored in the last hour; runs in the background."""
         now = time.monotonic()
         if now < self._due.get(key_id, now):
             return

@@ -38,8 +38,8 @@ PACKED = {"Content-Encoding": "identity"}
 
 
 def emptied_folder(database: Path | None) -> Path:
-    """An empty folder `FILE-files` beside the database, where there is room for what is to be stored, for files that come in
-    and go out; where the database is on a server (None) a new one of the system's, which the caller removes."""
+    """An emptied folder for uploads and downloads: `FILE-files` beside the database file, on the disk that has room for
+    them. If the database is on a server (None): a new temporary folder of the system, which the caller removes."""
     if database is None:
         return Path(tempfile.mkdtemp(prefix="clutchlife-"))
     folder = database.with_name(f"{database.name}-files")
@@ -50,7 +50,7 @@ def emptied_folder(database: Path | None) -> Path:
 
 @asynccontextmanager
 async def body_or_file(request: Request, folder: Path) -> AsyncIterator[bytes | Path]:
-    """A request's body: in memory where it is short, else as a file in the folder, which is removed in the end."""
+    """Context with a request's body: in memory if short, else as a file in the folder, removed at the end."""
     pieces, received = request.stream(), bytearray()
     async for piece in pieces:
         received += piece
@@ -67,12 +67,12 @@ async def body_or_file(request: Request, folder: Path) -> AsyncIterator[bytes | 
 
 
 def temporary_folder(folder: Path) -> AbstractAsyncContextManager[str]:
-    """A folder in that folder, removed in the end."""
+    """A subfolder that exists inside the context."""
     return contextmanager_in_threadpool(tempfile.TemporaryDirectory(dir=folder))
 
 
 async def written(pieces: AsyncIterable[bytes], file: IO[bytes]) -> None:
-    """Write what arrives to a file as it does."""
+    """Write the pieces to the file as they arrive, in a thread."""
     gathered = bytearray()
     async for piece in pieces:
         gathered += piece
@@ -148,13 +148,13 @@ class _StreamedForm(MultiPartParser):
 
 @asynccontextmanager
 async def opened(path: Path, mode: str) -> AsyncIterator[IO[bytes]]:
-    """A file opened inside."""
+    """Context with an opened file."""
     async with contextmanager_in_threadpool(await run_in_threadpool(path.open, mode)) as file:
         yield file
 
 
 def preferred(request: Request, media_types: Sequence[str]) -> str:
-    """The one of our media types that `Accept` weighs most, the first of them where none is named."""
+    """The media type of ours that the `Accept` header ranks highest; the first of ours if it names none of them."""
     weights = {}
     for part in request.headers.get("accept", "").lower().split(","):
         name, *parameters = (word.strip() for word in part.split(";"))
@@ -165,15 +165,15 @@ def preferred(request: Request, media_types: Sequence[str]) -> str:
 
 @dataclass(slots=True)
 class _SharedCopy:
-    """A copy that is being made or sent, and how many answers it is for."""
+    """A copy being made or sent, and the number of responses that use it."""
 
     making: "asyncio.Task[Copy]"
     users: int = 0
 
 
 class Copies:
-    """Copies of runs and their files, made in a folder to be sent: at most `most` bytes together, and a share of what is
-    free on the disk. Readers of the same content share one."""
+    """Temporary copies of runs and their files in a folder, to be sent as responses: at most `most` bytes together, and
+    only a share of the free disk space. Requests for the same content share one copy."""
 
     def __init__(self, folder: Path, most: int) -> None:
         self._folder = folder
@@ -183,8 +183,8 @@ class Copies:
         self._ending: set[asyncio.Task[None]] = set()
 
     async def of(self, tag: str, make: Callable[[Path], "Future[Any]"]) -> "Copy":
-        """The copy of that tag, to be sent; `make` writes it where there is none. Raises BusyError where the copies that are
-        being sent leave no room."""
+        """The copy with this tag, written by `make` if there is none yet. Raises BusyError if the copies being sent
+        leave no room."""
         made = self._made.get(tag)
         if made is None:
             made = self._made[tag] = _SharedCopy(asyncio.create_task(self._written(tag, make)))
@@ -196,7 +196,7 @@ class Copies:
             raise
 
     def leave(self, tag: str) -> None:
-        """An answer needs a copy no more; it is closed, in a thread, where none does."""
+        """Note that one response no longer needs the copy; the last one closes it, in a thread."""
         made = self._made[tag]
         made.users -= 1
         if not made.users:
@@ -229,14 +229,14 @@ _NO_ROOM = "the copies of runs that are being sent use all available room on the
 
 
 def _measured(path: Path) -> tuple[BinaryIO, int, int]:
-    """An opened file, its bytes, and the bytes that are free on its disk."""
+    """An opened file, its size and the free space on its disk [bytes]."""
     file = path.open("rb")
     return file, os.fstat(file.fileno()).st_size, shutil.disk_usage(path.parent).free
 
 
 @dataclass(frozen=True, slots=True)
 class Copy:
-    """An open file without a name, and what was returned by what wrote it."""
+    """An open, already unlinked file, and the return value of the function that wrote it."""
 
     copies: Copies
     tag: str
@@ -245,7 +245,8 @@ class Copy:
     returned: Any
 
     def answer(self, media_type: str, headers: Mapping[str, str]) -> Response:
-        """The file piece by piece; left at its end, or when the reader has gone."""
+        """A response that sends the file piece by piece, and releases the copy at the end or when the client
+        disconnects."""
         headers = dict(headers) | {"Content-Length": str(self.size)}
         return _Sent(self, media_type=media_type, headers=headers)
 
@@ -255,7 +256,7 @@ class Copy:
 
 
 class _Sent(StreamingResponse):
-    """The answer that sends a copy."""
+    """The response that sends a copy."""
 
     def __init__(self, copy: Copy, **more: Any) -> None:
         super().__init__(copy.pieces(), **more)

@@ -28,10 +28,10 @@ WITHIN = (0.0, 1e3, 1e4)
 
 
 class Metrics:
-    """One service's metrics; nothing is shared between services in one process.
+    """The metrics of one service; services in one process share none.
 
-    `each_clutch`: with series of every clutch. Where several processes answer at one port, each keeps its numbers in files
-    of one folder, and whichever is asked adds up those of all.
+    `each_clutch`: with series of every clutch. If several processes serve one port, each keeps its numbers in files of
+    one folder, and the process that gets the request adds up all of them.
     """
 
     def __init__(self, *, each_clutch: bool = False) -> None:
@@ -48,7 +48,7 @@ class Metrics:
             self.note_calls(lane, 0)
 
     def note_calls(self, lane: Lane, count: int) -> None:
-        """Note how many calls of a lane wait or run in this process."""
+        """Set the number of a lane's waiting and running calls in this process."""
         self._calls.labels(lane.name.lower()).set(count)
 
     def exposition(self, database: Database) -> bytes:
@@ -67,7 +67,7 @@ class Metrics:
 
 
 class _Made(Collector):
-    """Metrics that `make` gives when they are asked for."""
+    """A collector that calls `make` at each scrape."""
 
     def __init__(self, make: Callable[[], Iterator[Metric]]) -> None:
         self._make = make
@@ -77,7 +77,7 @@ class _Made(Collector):
 
 
 def _processes(folder: Path) -> Iterator[Metric]:
-    """What the processes that write into a folder take of the machine together; of one that has ended only counts stay."""
+    """Sums CPU, memory and files over the live processes that write into a folder; counters of ended processes remain."""
     metrics: dict[str, Metric] = {}
     for number in {path.stem.rpartition("_")[2] for path in folder.glob("*.db")}:
         if not Path("/proc", number).exists():
@@ -95,7 +95,7 @@ def _processes(folder: Path) -> Iterator[Metric]:
 
 
 def _totals(database: Database) -> Iterator[Metric]:
-    """What is there now and what waits, in numbers of all clutches together."""
+    """Numbers over all clutches: clutches, runs, held runs, ended lives, and diagnoses that wait or run."""
     text = "Clutches in use that are safe for at most this number of cycles (95 %); 0: they may be at their end of life"
     within = GaugeMetricFamily("clutchlife_clutches_within", text, labels=["cycles"])
     with database.reading() as connection:
@@ -117,7 +117,7 @@ def _totals(database: Database) -> Iterator[Metric]:
 
 
 def _each_clutch(database: Database) -> Iterator[Metric]:
-    """Runs, health and remaining cycles of every clutch; what is not known is left out."""
+    """Stored runs, health and remaining cycles of every clutch; unknown values are left out."""
     counts = GaugeMetricFamily("clutchlife_clutch_runs", "Runs stored", labels=["clutch"])
     health = GaugeMetricFamily("clutchlife_clutch_health", "1 when new, 0 at end of life", labels=["clutch"])
     text = "Duty cycles until end of life"

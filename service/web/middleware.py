@@ -36,7 +36,7 @@ from storage.engine.errors import StorageError
 
 
 class _OfRequests(ABC):
-    """Middleware whose `handle` is given requests; what else the server sends passes by."""
+    """Middleware whose `handle` gets HTTP requests; other ASGI events go straight to the application."""
 
     def __init__(self, app: ASGIApp) -> None:
         self.app = app
@@ -50,10 +50,10 @@ class _OfRequests(ABC):
 
 
 class Shares(_OfRequests):
-    """Each caller has a share: so many requests a second, and so many at once; more are refused with 429.
+    """Limits each caller to a rate of requests a second and a number at once; excess requests get 429.
 
-    What was not asked for two seconds is saved up. A caller is a key that was let in before, else an address: who tries
-    keys has one share. Whether the service lives may always be asked.
+    A caller may save up two seconds of unused requests. A caller is a known key, else an address: all attempts with
+    wrong keys count for the address. `/livez` and `/readyz` have no limit.
     """
 
     def __init__(self, app: ASGIApp, per_second: float, at_once: int) -> None:
@@ -97,7 +97,7 @@ class Shares(_OfRequests):
         return share
 
     def _wait(self, share: "_Share") -> float:
-        """Seconds after which the caller may ask again; 0 where it may ask now, which is then taken off its share."""
+        """Seconds until the caller may send a request; 0 if it may now, which is then deducted from its share."""
         now = time.monotonic()
         saved = min(limits.SAVED_SECONDS * self.per_second, share.saved + (now - share.at) * self.per_second)
         share.saved, share.at = saved, now
@@ -111,7 +111,7 @@ class Shares(_OfRequests):
 
 @dataclass(slots=True)
 class _Share:
-    """Requests that a caller has saved up at a moment [s], and how many of its requests run."""
+    """The requests that a caller has saved up at a moment [s], and its number of running requests."""
 
     saved: float
     at: float
@@ -119,7 +119,7 @@ class _Share:
 
 
 class Heads(_OfRequests):
-    """HEAD is answered wherever GET is: the same status and headers, and no body (RFC 9110, section 9.3.2)."""
+    """Answers HEAD wherever GET is answered, with the same status and headers but no body (RFC 9110, section 9.3.2)."""
 
     async def handle(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["method"] != "HEAD":
@@ -153,7 +153,7 @@ _PROBES = (*limits.UNLIMITED, "/metrics")
 
 
 class Edge(_OfRequests):
-    """What every request has: an id, safe headers, a count and a time by its route's template, a line in the log."""
+    """Gives every request an id, security headers, a log line, and a count and duration under its route's template."""
 
     def __init__(self, app: ASGIApp, metrics: Metrics) -> None:
         super().__init__(app)
@@ -209,12 +209,14 @@ _REMEMBERED = "clutchlife.poll"
 
 
 def remember(request: Request, again: Again) -> None:
-    """Answer the same address by `again` from now on. Only for what needs no more than the scope `read`."""
+    """Have later requests for this address answered by `again`, without the route. Only for answers that the scope
+    `read` may see."""
     request.scope[_REMEMBERED] = again
 
 
 class Polls(_OfRequests):
-    """Answers what was asked before without looking at anything else, for what was asked for last.
+    """Answers repeated GETs of recent addresses from the cache, once the caller's key is checked; the route is not
+    called.
 
     An answer is found by its path and its arguments as they were checked: however a number is written, it is one entry.
     """
@@ -262,7 +264,7 @@ async def _answered(route: Any, clutch_id: str | None, again: Again, scope: Scop
 
 
 def _arguments(route: Any, query: bytes) -> Hashable:
-    """A query's arguments as the route checks them; None where they are wrong, which the usual way says."""
+    """A query's arguments as the route parses them; None if they are invalid (the route then reports the error)."""
     if not query:
         return ()
     sent, fields = QueryParams(query), query_fields(route)
@@ -279,15 +281,16 @@ _GZIP = 16 + zlib.MAX_WBITS
 
 
 def _unpacked(receive: Receive) -> Receive:
-    """What receives a packed body unpacked, piece by piece in a thread. Raises InvalidError where it is no gzip, is cut off
-    or goes on after its end, and TooLargeError where it holds more than `limits.MAX_RATIO` times its bytes.
+    """A `receive` that decompresses a gzip request body, piece by piece in a thread. Raises InvalidError if the body is
+    no gzip, is cut off or goes on after its end, and TooLargeError if it unpacks to more than `limits.MAX_RATIO` times
+    its bytes.
     """
     unpacker = zlib.decompressobj(_GZIP)
     packed, more, ended = b"", True, False
     taken = given = 0
 
     async def receive_unpacked() -> Message:
-        """The next piece of the body, unpacked; then what follows a body."""
+        """The next decompressed piece of the body; after its end, the messages that follow."""
         nonlocal packed, more, ended, taken, given
         while not ended:
             if not packed and more:
@@ -317,10 +320,10 @@ def _unpacked(receive: Receive) -> Receive:
 
 
 class Encodings(_OfRequests):
-    """Bodies packed by gzip, both ways, but for answers that say that they are packed already; any other encoding sent is a
-    415.
+    """Compresses response bodies by gzip, unless they are already, and decompresses request bodies; any other encoding
+    of a request gets 415.
 
-    An answer's entity tag names its bytes, so the packed ones have a tag of their own: the same with a mark.
+    An entity tag names exact bytes, so the compressed response has the same tag with a mark.
     """
 
     def __init__(self, app: ASGIApp) -> None:
@@ -359,10 +362,10 @@ class Encodings(_OfRequests):
 
 
 class Answers(_OfRequests):
-    """Hands long answers to the server in pieces, each when the reader has taken the one before; what readers hold of them
-    together has a room of its own. One that has no room there is refused with 503.
+    """Sends long responses in pieces, each once the client has read the one before. Responses being sent share a budget
+    of memory; one that exceeds it is refused with 503.
 
-    Readers of the same cached answer hold it once.
+    A cached response sent to several clients counts once.
     """
 
     def __init__(self, app: ASGIApp) -> None:
@@ -407,7 +410,7 @@ class Answers(_OfRequests):
 
 
 class RootPath(_OfRequests):
-    """Middleware outside of all others. `root` is the path as `/clutch`, or empty."""
+    """Serves the application below a root path such as `/clutch` (or empty); the outermost middleware."""
 
     def __init__(self, app: ASGIApp, root: str) -> None:
         super().__init__(app)
@@ -438,6 +441,6 @@ class RootPath(_OfRequests):
 
 
 def _relative_address(address: str, host: str) -> str:
-    """An address of this service without scheme and host, which a proxy may have changed; others as they are."""
+    """An address of this service without scheme and host, which a proxy may have changed; other addresses unchanged."""
     parts = urlsplit(address)
     return parts._replace(scheme="", netloc="").geturl() if parts.netloc == host else address

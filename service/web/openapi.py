@@ -53,14 +53,14 @@ _UNCHANGED = {"description": "Unchanged: `If-None-Match` names the present answe
 
 
 def install(app: FastAPI, root: str) -> None:
-    """Have the application, which is reached below the path `root`, describe itself so."""
+    """Have the application, served below the path `root`, use this OpenAPI description."""
     plain = app.openapi
     servers = {"servers": [{"url": root}]} if root else {}
     app.openapi = cache(lambda: completed(plain()) | servers)  # type: ignore[method-assign]
 
 
 def completed(api: Json) -> Json:
-    """The description with all that holds for every address, changed in place."""
+    """The OpenAPI description, changed in place, with the parts added that all addresses share."""
     schemas = api.setdefault("components", {}).setdefault("schemas", {})
     api["components"]["securitySchemes"] = {"key": _SECURITY}
     api["security"] = [{"key": []}, {}]
@@ -81,7 +81,7 @@ def completed(api: Json) -> Json:
 
 
 def _complete(path: str, method: str, operation: Json) -> None:
-    """Headers, 304 and examples of one operation."""
+    """Add the common headers, the response 304 and examples to one operation."""
     names = set()
     for parameter in operation.get("parameters", ()):
         names.add(parameter["name"])
@@ -101,7 +101,8 @@ def _complete(path: str, method: str, operation: Json) -> None:
 
 
 def _named(schema: Json, schemas: Json) -> Json:
-    """The schema with what it is made of moved to the components; where it has fields, a reference to it among them.
+    """The schema with its inner schemas moved to the components; a schema with fields moves there too and becomes a
+    `$ref`.
 
     A reference finds its schema there alone, and who writes a client from the description names its types by it.
     """
@@ -120,7 +121,7 @@ def _named(schema: Json, schemas: Json) -> Json:
 
 
 def _content(part: Json) -> str:
-    """What a schema says, wherever its parts stand and whatever suffix they have."""
+    """A schema's text, the same wherever it and its parts are stored and whether or not their names have the suffix."""
     text = json.dumps(part, sort_keys=True)
     return text.replace("#/$defs/", "#/components/schemas/").replace(f'{_SENT}"', '"')
 
@@ -138,7 +139,7 @@ def _refer(part: Any, names: dict[str, str]) -> None:
 
 
 def _example(schema: Json, owner: str, name: str) -> Any:
-    """The field's or parameter's example; None where it consists of fields that have theirs, and where there is none."""
+    """The example of a field or parameter; None if it has none, or consists of fields with examples of their own."""
     if consists_of_fields(schema):
         return None
     for kind in _kinds(schema):
@@ -151,7 +152,7 @@ def _example(schema: Json, owner: str, name: str) -> Any:
 
 
 def consists_of_fields(schema: Json) -> bool:
-    """Whether a schema refers to another one, whose fields are described there."""
+    """Whether a schema refers to another one that describes fields of its own."""
     kinds = _kinds(schema)
     inside = [kind["items"] for kind in kinds if isinstance(kind.get("items"), dict)]
     return any("$ref" in kind for kind in kinds) or any(map(consists_of_fields, inside))
@@ -163,7 +164,8 @@ def _kinds(schema: Json) -> list[Json]:
 
 
 def _shaped(schema: Json, value: Any) -> Any:
-    """A value as the schema has it: one of several where it takes one, in lists where it takes those."""
+    """An example value converted to the schema's type: put into a list, taken as the first item of a list or object, or
+    made an integer."""
     types = {kind.get("type"): kind for kind in _kinds(schema)}
     if "array" in types:
         items = types["array"].get("items", {})

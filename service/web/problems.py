@@ -92,7 +92,7 @@ def _printable(text: str) -> str:
 
 
 def install(app: FastAPI) -> None:
-    """Map every error of the service to its answer."""
+    """Map every error of the service to its problem response."""
     app.exception_handler(ServiceError)(_service_error)
     app.exception_handler(StorageError)(_storage_error)
     app.exception_handler(RequestValidationError)(_request_error)
@@ -156,7 +156,7 @@ def _system_error(request: Request, error: OSError) -> Response:
 
 
 def unexpected(request: Request, error: Exception) -> Response:
-    """The answer for an error of the program, which the log says all of and the answer nothing."""
+    """The response to a program error: the log has the details, the response has none."""
     _log.error("%s %s", request.method, route_of(request), exc_info=error)
     return refused(ServiceError, "the service's log describes this error")
 
@@ -168,7 +168,7 @@ Described: TypeAlias = dict[int | str, dict[str, Any]]
 
 
 def described(*kinds: type[ServiceError]) -> Described:
-    """OpenAPI responses for these problems and for those that every address has."""
+    """The OpenAPI responses for these problems and for those common to all addresses."""
     always: list[type[ServiceError]] = [UnauthorizedError, ForbiddenError, InvalidError, TooManyError]
     answers: Described = {kind.status: _described(kind.title) for kind in [*always, *kinds]}
     answers[503] = _described("Busy, or the database cannot be used; try again after Retry-After")

@@ -27,8 +27,8 @@ _GIVEN_BACK = ("inactive_file", "active_file", "slab_reclaimable")
 
 
 class Readiness:
-    """What keeps the service from working, which needs so many bytes `least_disk` and `least_memory` left. Asked from the
-    event loop; `close` at the end."""
+    """Checks whether the service can work: disk, memory, database, workers, jobs and store of raw records; needs at
+    least `least_disk` and `least_memory` free bytes. Call it from the event loop; `close` at the end."""
 
     def __init__(
         self, database: Database, workers: Workers, jobs: JobQueue, *, least_disk: int, least_memory: int
@@ -51,7 +51,7 @@ class Readiness:
         self._looking: asyncio.Future[dict[str, str]] | None = None
 
     async def faults(self) -> dict[str, str]:
-        """What is wrong, in words, by part; empty where the service can work."""
+        """The faults found, by part, each a sentence; empty if the service can work."""
         if self._looking is None or self._looking.done():
             self._looking = asyncio.get_running_loop().run_in_executor(self._thread, self._look)
         try:
@@ -79,7 +79,7 @@ class Readiness:
         return wrong
 
     def _fault_of_raw_records(self) -> str | None:
-        """Why the store of raw records cannot be used, as it was found at the last look at it."""
+        """Why the store of raw records cannot be used, by its latest check; None if it can."""
         if self._raw is None or (self._raw.done() and time.monotonic() >= self._look_again):
             self._raw = self._raw_thread.submit(self._look_at_raw_records)
         try:
@@ -107,8 +107,8 @@ class Readiness:
 
 
 def available_memory() -> int | None:
-    """Bytes of memory that may still be taken, of the machine and of the process's own control group (version 2); None where
-    the system does not say."""
+    """Available memory [bytes] within the limits of the machine and of the process's control group (version 2); None if
+    the system does not report it."""
     left = []
     try:
         lines = (line.split() for line in _MEMORY.read_text(encoding="ascii").splitlines())

@@ -50,27 +50,28 @@ _FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n")
 
 @dataclass(frozen=True, slots=True)
 class ExportedTable(Generic[AnswerType]):
-    """A table that is exported: the `rows` of an answer of a type, and their columns where there are none."""
+    """An exportable table: the `rows` function of an answer's type, and the columns of an empty table."""
 
     answer: type[AnswerType]
     rows: Callable[[AnswerType], Iterable[Cells]]
     columns: Sequence[str]
 
     def page(self, answer: AnswerType, part: Part = WHOLE) -> CsvPage:
-        """The part of an answer's rows that was asked for; the table goes on where the part or the answer does."""
+        """The requested page of an answer's rows; its cursor is set while the rows or the answer continue."""
         page = part.sliced(list(self.rows(answer)))
         return CsvPage(encode_table(self.columns, page.items), page.next or getattr(answer, "next", None))
 
     def page_of_json(self, body: bytes, part: Part) -> CsvPage:
-        """The same of an answer's JSON."""
+        """`page` for an answer given as JSON."""
         return self.page(self.answer.model_validate_json(body), part)
 
 
 def encode_table(columns: Sequence[str], rows: Sequence[Cells]) -> bytes:
-    """CSV after RFC 4180 in UTF-8, a header row first; null is an empty field.
+    """A table as CSV by RFC 4180 in UTF-8, with a header row; null is an empty field.
 
-    A first row with other names than `columns` gives the columns. Text that a spreadsheet would take for a formula has an
-    apostrophe before it: a note that a rig has sent must compute nothing, and send nothing, where an engineer opens it.
+    If the first row has other names than `columns`, it gives the columns. Text that a spreadsheet would take for a
+    formula is preceded by an apostrophe, so that a rig's note cannot compute or send anything when an engineer opens
+    it.
     """
     text = io.StringIO()
     writer = csv.DictWriter(text, columns if not rows or rows[0].keys() == set(columns) else tuple(rows[0]))
@@ -98,14 +99,14 @@ def now() -> str:
 async def answer(
     request: Request, query: Callable[Given, BaseModel], *given: Given.args, **more: Given.kwargs
 ) -> Response:
-    """A GET's answer that is made again each time; its ETag is that of the bytes: it changes when and only when they do."""
+    """The response to a GET, computed at each request; its ETag is a hash of the bytes."""
     return tagged(request, CachedAnswer.of(await run_in_threadpool(lambda: to_json(query(*given, **more)))), JSON_TYPE)
 
 
 async def cached_answer(
     context: Context, key: Hashable, version: Hashable, make: Callable[[], bytes | CsvPage]
 ) -> CachedAnswer:
-    """What the cache has for `key` at `version`; where it has nothing yet, `make` is called in a thread."""
+    """The cached response for `key` at `version`; if there is none, `make` computes it in a thread."""
     answer = context.answers.held(key, version)
     if answer is not None:
         return answer
@@ -114,7 +115,7 @@ async def cached_answer(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OfClutch:
-    """A request about one clutch: which page of the answer."""
+    """A request about one clutch: the context, the clutch and the requested page."""
 
     request: Request
     context: Context
@@ -127,7 +128,7 @@ class OfClutch:
 
     @property
     def whole(self) -> "OfClutch":
-        """The request for all items, for answers that cut the page themselves."""
+        """The same request for all items, for answers that cut the page themselves."""
         return replace(self, part=WHOLE)
 
 
@@ -171,16 +172,14 @@ WholeOf = Annotated[OfClutch, Depends(_whole_of_clutch)]
 
 
 async def clutch_bytes(of: OfClutch, query: Callable[[Database, str], bytes]) -> bytes:
-    """An intermediate result of a clutch's revision that an answer needs. Raises NotFoundError."""
+    """An intermediate result that an answer needs, cached per revision of the clutch. Raises NotFoundError."""
     key = (of.clutch_id, name_of(query))
     return (await cached_answer(of.context, key, _revision(of), lambda: query(of.database, of.clutch_id))).body
 
 
 async def clutch_answer(of: OfClutch, query: Callable[..., BaseModel | bytes], *arguments: Hashable) -> Response:
-    """A GET's answer that follows from a clutch's revision: `query(database, clutch_id, *arguments)`, whose bytes are JSON.
-
-    Where it was made for this revision already, nothing is read. Raises NotFoundError.
-    """
+    """The response to a GET of `query(database, clutch_id, *arguments)` as JSON, cached per revision of the clutch.
+    Raises NotFoundError."""
 
     def make() -> bytes:
         made = query(of.database, of.clutch_id, *arguments)
@@ -197,7 +196,7 @@ async def clutch_answer(of: OfClutch, query: Callable[..., BaseModel | bytes], *
 async def clutch_table(
     of: OfClutch, query: Query[AnswerType], table: ExportedTable[AnswerType], *arguments: Hashable
 ) -> Response:
-    """The CSV export of a page that follows from a clutch's revision. Raises NotFoundError."""
+    """A page as CSV, cached per revision of the clutch. Raises NotFoundError."""
     revision = _revision(of)
     key = (of.clutch_id, f"{name_of(query)}.csv", *arguments)
     make = partial(query, of.database, of.clutch_id, *arguments)
@@ -209,8 +208,8 @@ async def clutch_table(
 async def computed_answer(
     of: OfClutch, query: Query[BaseModel], *arguments: Hashable, prefer: str | None = None, lane: Lane = Lane.ANSWERS
 ) -> Response:
-    """A GET's answer that takes long: `query(database, clutch_id, *arguments)`, computed by a worker of that lane; a page of
-    its items where one was asked for. `prefer` is what the sender prefers. Raises NotFoundError."""
+    """The response to an expensive GET: `query(database, clutch_id, *arguments)`, computed by a worker process of that
+    lane, or a page of its items. `prefer` is the request's `Prefer` header. Raises NotFoundError."""
     revision, answer = await _computed(of, _revision(of), query, arguments, prefer, lane)
     if of.part == WHOLE:
         remember(of.request, repeated_answer(of.context, (of.clutch_id, name_of(query), *arguments)))
@@ -231,7 +230,8 @@ async def computed_table(
     *arguments: Hashable,
     prefer: str | None = None,
 ) -> Response:
-    """The CSV export of the same: a page of the rows of its JSON, which goes on where that does. Raises NotFoundError."""
+    """The CSV export of `computed_answer`: a page of rows of the same JSON, with the same continuation. Raises
+    NotFoundError."""
     revision, answer = await _computed(of, _revision(of), query, arguments, prefer)
     key = (of.clutch_id, f"{name_of(query)}.csv", *arguments, of.part)
     page = await cached_answer(of.context, key, revision, lambda: table.page_of_json(answer.body, of.part))
@@ -241,10 +241,9 @@ async def computed_table(
 async def computed_of_each(
     request: Request, context: Context, answered: type[AnswerType], query: Query[AnswerType], *arguments: Hashable
 ) -> list[AnswerType]:
-    """The newest answers of a type that a query gives about each clutch, one after the other: the same that are given for
-    the clutch alone.
+    """The newest cached answers of a query, clutch after clutch, the same as for each clutch alone.
 
-    Raises ClientDisconnect where nobody waits for them any more.
+    Raises ClientDisconnect once the client has gone.
     """
 
     def newest() -> dict[str, int]:
@@ -285,13 +284,14 @@ async def _computed(
 
 
 async def begin_computed(context: Context, clutch_id: str, query: Query[BaseModel]) -> None:
-    """Hold the answer of a clutch that has just been registered, so that the one after its first run is not waited for."""
+    """Put the answer of a newly registered clutch into the cache, so that a request after its first run need not wait."""
     revision, body = await run_in_threadpool(revision_and_json, context.database, query, clutch_id, ())
     context.answers.begin((clutch_id, name_of(query)), revision, body)
 
 
 def repeated_answer(context: Context, key: Hashable, *, of_clutch: bool = True) -> Again:
-    """What answers the same address again by what the cache holds of the clutch's revision, or of the last commit of all."""
+    """A function for `remember` that answers from the cache, at the clutch's present revision or the database's last
+    commit."""
 
     def again(request: Request) -> Response | None:
         snapshot = snapshot_of(request)
@@ -302,13 +302,13 @@ def repeated_answer(context: Context, key: Hashable, *, of_clutch: bool = True) 
 
 
 def preferred_wait(prefer: str | None) -> int | None:
-    """Seconds that the sender prefers to wait (RFC 7240: `Prefer: wait=SECONDS`), None where it does not say."""
+    """Seconds to wait by the header `Prefer: wait=SECONDS` (RFC 7240); None if it does not say."""
     preferred = _WAIT.search(prefer or "")
     return None if preferred is None else min(int(preferred[1]), LONGEST_WAIT_SECONDS)
 
 
 def _revision(of: OfClutch) -> int:
-    """The revision of the clutch in the path when the request came in. Raises NotFoundError."""
+    """The revision of the request's clutch, read when the request came in. Raises NotFoundError."""
     revision = snapshot_of(of.request).revision
     if revision is None:
         raise unknown_clutch(of.clutch_id)
@@ -316,12 +316,12 @@ def _revision(of: OfClutch) -> int:
 
 
 async def table(request: Request, make: Callable[[], CsvPage]) -> Response:
-    """A GET's answer as CSV that is made again each time, a page of it."""
+    """A page as CSV, computed at each request."""
     return tagged(request, CachedAnswer.of(await run_in_threadpool(make)), CSV_TYPE)
 
 
 def tagged(request: Request, answer: CachedAnswer, media_type: str, revision: int | None = None) -> Response:
-    """The answer, or 304 where `If-None-Match` names it; with the clutch's revision that it is of, where it is of one."""
+    """The response with its ETag and, if given, the clutch's revision; 304 if `If-None-Match` has the tag."""
     headers = {"ETag": answer.tag, "Cache-Control": "no-cache"}
     if revision is not None:
         headers["Clutchlife-Revision"] = str(revision)
@@ -331,18 +331,18 @@ def tagged(request: Request, answer: CachedAnswer, media_type: str, revision: in
 
 
 def _following(request: Request, cursor: str) -> str:
-    """The address of the next page, relative to this service: behind a proxy its own name is not known."""
+    """The link to the next page, relative to this service: behind a proxy the service does not know its own host name."""
     url = request.url.include_query_params(cursor=cursor)
     return f"{url.path}?{url.query}"
 
 
 def json_answer(content: BaseModel, status: int = 200, **headers: str) -> Response:
-    """An answer to a change, or to a question that is asked once: JSON without a tag."""
+    """A JSON response without ETag, for changes and one-off questions."""
     return Response(content=to_json(content), status_code=status, media_type=JSON_TYPE, headers=headers)
 
 
 def unchanged(request: Request, headers: Mapping[str, str]) -> Response | None:
-    """304 where `If-None-Match` names the `ETag` of the headers, else None."""
+    """A response 304 if `If-None-Match` names the `ETag` of the headers, else None."""
     asked_for = request.headers.get("if-none-match", "")
     if asked_for.strip() == "*" or headers["ETag"] in (tag.strip().removeprefix("W/") for tag in asked_for.split(",")):
         return Response(status_code=304, headers=dict(headers))
@@ -350,23 +350,23 @@ def unchanged(request: Request, headers: Mapping[str, str]) -> Response | None:
 
 
 async def sent(request: Request, schema: type[Body]) -> Body:
-    """The body of a request that says it is JSON; a browser cannot send such a one across sites unasked.
+    """The request body, which must be declared as JSON: browsers do not send that across sites unasked.
 
-    Raises UnsupportedMediaTypeError, and InvalidError, which names every place that is wrong.
+    Raises UnsupportedMediaTypeError, and InvalidError, which names every wrong place.
     """
     require_json(request)
     return await parsed(schema, await request.body())
 
 
 def require_json(request: Request) -> None:
-    """Raise UnsupportedMediaTypeError where a request does not say that its body is JSON."""
+    """Raise UnsupportedMediaTypeError if the request does not declare its body as JSON."""
     kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
     if kind != "application/json" and not kind.endswith("+json"):
         raise UnsupportedMediaTypeError(f"send the body as application/json, not as {kind[:80]!r}")
 
 
 class TakingRoute(TypedDict):
-    """What FastAPI is told of a route that takes a body."""
+    """Arguments of FastAPI's route decorator for a route that reads its request body itself."""
 
     response_model: type[BaseModel]
     responses: Described
@@ -382,8 +382,8 @@ def taking(
     *,
     required: bool = True,
 ) -> TakingRoute:
-    """How a route that takes a body is described, since it reads that itself: the body with an example, its answer, and what
-    other statuses `also` mean that come with the same answer."""
+    """The OpenAPI description of a route that reads its body itself: the body with an example, the response, and the
+    meaning of other statuses (`also`) with the same response."""
     described = body.model_json_schema() if isinstance(body, type) else body
     content = {"application/json": {"schema": described, "example": example}}
     other_responses: Described = {
@@ -400,7 +400,7 @@ Changed = TypeVar("Changed")
 
 
 async def changed(of: OfClutch, change: Callable[..., Changed], *arguments: Any) -> Changed:
-    """What a worker returns that changes a clutch. The changes of one clutch take turns."""
+    """The result of a change, made by a worker process in the lane of runs. The changes of one clutch take turns."""
     submit, clutch_id = of.context.workers.submit, of.clutch_id
     changing = submit(Lane.RUNS, change, clutch_id, *arguments, turn=clutch_id, seconds=CHANGE_SECONDS)
     return await asyncio.wrap_future(changing)
@@ -413,7 +413,7 @@ _FIRST_PAUSE, _GROWTH, _LONGEST_PAUSE = 0.05, 1.5, 0.4
 
 
 async def until_ended(look: Callable[[], Looked], has_ended: Callable[[Looked], bool], wait: float) -> Looked:
-    """Look repeatedly until the thing has ended, at most for `wait` [s]; returns the last look."""
+    """Look repeatedly until the thing has ended or `wait` [s] is over; returns the last look."""
     deadline = time.monotonic() + wait
     pause = _FIRST_PAUSE
     while True:

@@ -17,7 +17,8 @@ from storage.tables import IN_A_STORE, channel, raw_removal, raw_store
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RawStore:
-    """A store by its address; `mark` is this database's, `removals` how many batches were removed from it."""
+    """A store of raw records by its address; `mark` is this database's mark in it, `removals` the number of removed
+    batches."""
 
     store_key: int
     address: str
@@ -37,56 +38,56 @@ _numbers = (
 
 
 def _of_names(store_key: int, names: Iterable[str]) -> ColumnElement[bool]:
-    """Whether a removal is of one of the names in the store."""
+    """The condition that a removal is of one of the names in the store."""
     return and_(raw_removal.c.store_key == store_key, among(raw_removal.c.blob, list(names)))
 
 
 def all_of(connection: Connection) -> list[RawStore]:
-    """All stores that ever were in use, the first first."""
+    """All stores ever in use, oldest first."""
     return _rows.all(connection.execute(select(raw_store).order_by(raw_store.c.store_key)))
 
 
 def in_use(connection: Connection) -> RawStore | None:
-    """The store that long columns of new runs go to, None where they go into the database."""
+    """The store for long columns of new runs, None if they are stored in the database."""
     return _rows.first(connection.execute(select(raw_store).where(raw_store.c.in_use == 1)))
 
 
 def add(connection: Connection, address: str, mark: str) -> None:
-    """A store that is not in use yet. Raises IntegrityError where its address is known."""
+    """Add a store that is not in use yet. Raises IntegrityError where its address is known."""
     connection.execute(raw_store.insert(), {"address": address, "mark": mark})
 
 
 def use(connection: Connection, address: str | None) -> None:
-    """Have new runs go to the store of that address, into the database where it is None."""
+    """Store long columns of new runs in the store at that address, None: in the database."""
     connection.execute(update(raw_store).values(in_use=0))
     if address is not None:
         connection.execute(update(raw_store).where(raw_store.c.address == address).values(in_use=1))
 
 
 def set_address(connection: Connection, store_key: int, address: str) -> None:
-    """Look for a store's blobs at another address. Raises IntegrityError where that is known."""
+    """Change a store's address. Raises IntegrityError where that is known."""
     connection.execute(update(raw_store).where(raw_store.c.store_key == store_key).values(address=address))
 
 
 def numbers(connection: Connection) -> dict[str, tuple[int, int]]:
-    """address -> how many columns are there, and how many blobs they are."""
+    """address -> the numbers of columns and of blobs there."""
     return {address: (columns, blobs) for address, columns, blobs in connection.execute(_numbers)}
 
 
 def named(connection: Connection, store_key: int, names: Iterable[str]) -> set[str]:
-    """The subset of the names that rows use in the store."""
+    """Those of the names that rows use in the store."""
     query = select(channel.c.blob).where(channel.c.store_key == store_key, among(channel.c.blob, list(names)))
     return set(connection.execute(query.where(IN_A_STORE).distinct()).scalars())
 
 
 def names_in_store(connection: Connection, store_key: int, *, after: str, most: int) -> list[str]:
-    """The names that rows have in the store, in order, at most so many behind `after`."""
+    """The names that rows use in the store, in order, at most `most` after the name `after`."""
     query = select(channel.c.blob).where(channel.c.store_key == store_key, IN_A_STORE, channel.c.blob > after)
     return list(connection.execute(query.distinct().order_by(channel.c.blob).limit(most)).scalars())
 
 
 def mark_removed(connection: Connection, store_key: int, names: Sequence[str], *, at: float) -> list[str]:
-    """Note that those of the names which no row has are being removed from `at` on [s since 1970]; which these are."""
+    """Record that the removal of the names used by no row begins at `at` [s since 1970]; returns these names."""
     still_named = named(connection, store_key, names)
     unnamed = [name for name in names if name not in still_named]
     if unnamed:
@@ -99,24 +100,25 @@ def mark_removed(connection: Connection, store_key: int, names: Sequence[str], *
 
 
 def finish_removal(connection: Connection, store_key: int, names: Sequence[str]) -> None:
-    """Note that these have been removed."""
+    """Record that these names have been removed."""
     connection.execute(update(raw_removal).where(_of_names(store_key, names)).values(finished=1))
 
 
 def interrupted_removals(connection: Connection, store_key: int, *, before: float) -> list[str]:
-    """Names whose removal began before that time [s since 1970] and was not finished."""
+    """The names with a removal begun before that time [s since 1970] and not finished."""
     begun = (raw_removal.c.store_key == store_key, raw_removal.c.finished == 0, raw_removal.c.at < before)
     return list(connection.execute(select(raw_removal.c.blob).where(*begun)).scalars())
 
 
 def forget_removals(connection: Connection, store_key: int, *, before: float) -> None:
-    """Forget finished removals from before that time [s since 1970], which no run on its way can be hit by any more."""
+    """Delete the records of removals finished before that time [s since 1970], which no run being stored can conflict
+    with."""
     ended = (raw_removal.c.store_key == store_key, raw_removal.c.finished == 1, raw_removal.c.at < before)
     connection.execute(delete(raw_removal).where(*ended))
 
 
 def are_kept(connection: Connection, store: RawStore, names: Iterable[str]) -> bool:
-    """Whether what was put into the store since `store` was read is there: not removed, nor the store at another address."""
+    """Whether blobs put into the store since `store` was read are still found: none removed, and the address unchanged."""
     since = or_(raw_removal.c.finished == 0, raw_removal.c.number > store.removals)
     removed = select(func.count()).select_from(raw_removal).where(_of_names(store.store_key, names), since)
     address = select(raw_store.c.address).where(raw_store.c.store_key == store.store_key)

@@ -28,9 +28,10 @@ MARK = "clutchlife-store"
 
 
 class BlobStore(ABC):
-    """A store; threads share it. All methods raise RawStoreUnavailable where it is away, full, or has no mark.
+    """A store of blobs by name, shared by threads. All methods raise RawStoreUnavailable if it is away, full, or has no
+    mark.
 
-    `address` is where it is, without anything secret, `missing` what else may be wrong where it has no mark.
+    `address`: its address without secrets; `missing`: another possible cause if it has no mark.
     """
 
     address: str
@@ -38,13 +39,13 @@ class BlobStore(ABC):
 
     @abstractmethod
     def put(self, name: str, data: bytes | bytearray) -> None:
-        """Store bytes under a name; they are there, whole, when this returns, and at no time in part.
+        """Store bytes under a name; they are complete when this returns, and never visible in part.
 
-        Again under the same name: they are written again, which mends what was damaged and makes them new to `names`.
+        Storing a name again writes its bytes again, which repairs damage and makes it new for `names`.
         """
 
     def get(self, name: str) -> bytes:
-        """The bytes as they are stored. Raises MissingBlob where the store has none of that name."""
+        """The stored bytes. Raises MissingBlob if the store has none of that name."""
         data = self.read(name)
         if data is None:
             self.require_mark()
@@ -53,31 +54,31 @@ class BlobStore(ABC):
 
     @abstractmethod
     def read(self, name: str) -> bytes | None:
-        """A blob's bytes, or the mark's; None if there is none, whether or not the place is a store."""
+        """The bytes of a blob or of the mark; None if there are none, even if the place is no store."""
 
     @abstractmethod
     def exists(self, name: str) -> bool:
-        """Whether there is one of that name."""
+        """Whether the store has a blob of that name."""
 
     @abstractmethod
     def names(self) -> Iterator[tuple[str, float]]:
-        """Each name with the time of its last `put` [s since 1970], also of what an interrupted one has left."""
+        """Each name with the time of its last `put` [s since 1970], including the remains of interrupted ones."""
 
     @abstractmethod
     def delete(self, name: str) -> None:
-        """Remove one; nothing happens where there is none."""
+        """Remove a blob, if there is one of that name."""
 
     def mark(self) -> str | None:
-        """What `set_mark` wrote, None in a place that no database has used yet."""
+        """The mark written by `set_mark`, None in a place that no database has used yet."""
         data = self.read(MARK)
         return None if data is None else data.decode()
 
     @abstractmethod
     def set_mark(self, mark: str) -> None:
-        """Make the place a store that belongs to the database of that mark."""
+        """Make the place a store, and mark it as the database's."""
 
     def require_mark(self) -> None:
-        """Raise RawStoreUnavailable where the place is no store."""
+        """Raise RawStoreUnavailable if the place has no mark."""
         if self.read(MARK) is None:
             raise RawStoreUnavailable(
                 f"{self.address} is no store of raw records: the file {MARK} is missing. {self.missing}"
@@ -90,7 +91,7 @@ def name_of(data: bytes | bytearray) -> str:
 
 
 def fetched(store: BlobStore, name: str) -> bytes:
-    """The blob of that name, held against it. Raises DamagedData where it is missing or another."""
+    """The blob of that name, verified by its hash. Raises DamagedData if it is missing or different."""
     data = store.get(name)
     sha256 = name_of(data)
     if sha256 != name:
@@ -107,7 +108,7 @@ _PARTIAL = "partial"
 
 
 class FolderStore(BlobStore):
-    """A folder. Made by `opening`."""
+    """A store in a folder. Made by `opening`."""
 
     missing = "Is its disk mounted?"
 
@@ -144,7 +145,7 @@ class FolderStore(BlobStore):
             self._path(name).unlink(missing_ok=True)
 
     def set_mark(self, mark: str) -> None:
-        """Make the folder, where it is not there, and the mark in it."""
+        """Create the folder, if missing, and the mark in it."""
         with self._usable():
             self._root.mkdir(mode=_FOLDER_MODE, parents=True, exist_ok=True)
             self._write(self._root / MARK, mark.encode())
@@ -173,7 +174,7 @@ class FolderStore(BlobStore):
 
     @contextmanager
     def _usable(self) -> Iterator[None]:
-        """The system's errors as the store's own."""
+        """Context that raises the system's errors as RawStoreUnavailable."""
         try:
             yield
         except OSError as error:
@@ -183,7 +184,7 @@ class FolderStore(BlobStore):
 
 
 def _make(folder: Path) -> None:
-    """Make a folder, so that a power cut does not take it away with what is in it."""
+    """Create a folder durably, so that a power cut does not remove it."""
     try:
         folder.mkdir(mode=_FOLDER_MODE)
     except FileExistsError:
@@ -209,7 +210,8 @@ _Answer = TypeVar("_Answer")
 
 
 class ObjectStore(BlobStore):
-    """A bucket, or what begins with a prefix in it. Made by `opening`; RawStoreUnavailable where no client is installed."""
+    """A store in an object-storage bucket, or below a prefix in it. Made by `opening`; RawStoreUnavailable if no client
+    is installed."""
 
     missing = "Does this bucket exist?"
 
@@ -261,11 +263,12 @@ class ObjectStore(BlobStore):
         self._request(lambda: self._store.delete(name))
 
     def set_mark(self, mark: str) -> None:
-        """Put the mark's object; the bucket must be there."""
+        """Store the mark's object; the bucket must exist."""
         self.put(MARK, mark.encode())
 
     def _request(self, request: Callable[[], _Answer], *, absent: bool = False) -> _Answer:
-        """What the request gives; the client's errors as the store's own, but for what is `absent` where that is expected.
+        """The request's result; the client's errors are raised as RawStoreUnavailable, except `absent` objects if these
+        are expected.
 
         What the client says may be long: the log has it, the error one line.
         """
@@ -298,7 +301,7 @@ _MAX_OPEN = 8
 
 
 def normal_address(address: str) -> str:
-    """The one way in which an address is written. Raises ValueError, without the address, which may hold a secret."""
+    """The address in its one canonical form. Raises ValueError, without the address, which may hold a secret."""
     if address == DATABASE:
         return address
     folder, bucket = _FOLDER.fullmatch(address), _BUCKET.fullmatch(address)

@@ -36,7 +36,7 @@ _KEPT = "clutchlife_kept"
 
 @dataclass(frozen=True, slots=True)
 class GrantedKey:
-    """What an active key grants: `clutches` None where it is bound to none, `expires_at` None where it does not expire."""
+    """The permissions of an active key; `clutches` None: not bound to clutches, `expires_at` None: without expiry."""
 
     key_id: str
     scope: str
@@ -47,7 +47,7 @@ class GrantedKey:
 
 @dataclass(frozen=True, slots=True)
 class Question:
-    """The clutch that a request is about and the hash of its key, None where it names none."""
+    """The clutch that a request is about, and the hash of its key; None for either if there is none."""
 
     clutch_id: str | None = None
     secret_sha256: str | None = None
@@ -71,10 +71,10 @@ class Snapshot:
 
 
 class Watch(ABC):
-    """Answers the questions; threads share it.
+    """Answers requests' questions about key and clutch from one cheap look at the database; threads share it.
 
-    Those of the event loop are asked in a thread, one look for all who ask at that moment: whatever the database waits for,
-    the loop does not. No answer is older than its question: requests that come during a look share the next.
+    Questions from the event loop are asked in a thread, with one look for all that wait, so that the loop never waits
+    for the database. No answer is older than its question: requests that come during a look share the next.
     """
 
     def __init__(self, name: str, patience: float) -> None:
@@ -88,10 +88,10 @@ class Watch(ABC):
 
     @abstractmethod
     def snapshots(self, questions: Sequence[Question]) -> list[Snapshot]:
-        """Snapshots for several questions, all of the same moment."""
+        """Snapshots for several questions, all at the same moment."""
 
     async def look(self, question: Question) -> Snapshot:
-        """A snapshot for a caller on the event loop. Raises StorageUnavailable where the database does not answer."""
+        """A snapshot for a caller on the event loop. Raises StorageUnavailable if the database does not answer."""
         self.refuse_closed()
         answer: asyncio.Future[Snapshot] = asyncio.get_running_loop().create_future()
         if self._asking is None:
@@ -107,7 +107,7 @@ class Watch(ABC):
         return answer.result()
 
     def close(self) -> None:
-        """End the thread; who asks from then on is told that the database was closed. May be called twice."""
+        """End the thread; later callers get StorageUnavailable. May be called twice."""
         self._closed = True
         self._thread.shutdown()
 
@@ -116,7 +116,7 @@ class Watch(ABC):
             raise StorageUnavailable(f"{self._name} has been closed")
 
     async def _ask(self) -> None:
-        """Ask for all who wait, until nobody does."""
+        """Answer all waiting callers, look by look, until none waits."""
         try:
             while self._waiting:
                 questions, self._waiting = self._waiting, []
@@ -147,14 +147,14 @@ class Watch(ABC):
 
 @lru_cache(maxsize=256)
 def granted(row: tuple[Any, ...]) -> GrantedKey:
-    """What a row of a key grants: its id, scope, note, clutches (JSON) and end."""
+    """The permissions in a key's row: id, scope, note, clutches (JSON) and expiry."""
     key_id, scope, note, clutches, expires_at = row
     return GrantedKey(key_id, scope, note, None if clutches is None else frozenset(json.loads(clutches)), expires_at)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SharedAnswer:
-    """The answer of that name about a clutch, computed by that build of a release from that revision of the clutch."""
+    """An answer about a clutch by its name, computed by one build of a release at one revision of the clutch."""
 
     clutch_id: str
     name: str
@@ -164,18 +164,18 @@ class SharedAnswer:
 
 
 def kept_of(connection: Connection) -> Kept | None:
-    """What is kept of a database, for a transaction that only reads; None for one that writes, as what it has changed may be
-    rolled back."""
+    """The memory cache of a database, for a read-only transaction; None in a writing one, whose changes may be rolled
+    back."""
     kept: Kept | None = connection.get_execution_options().get(_KEPT)
     return kept
 
 
 class Database(ABC):
-    """An open database: its transactions, what is asked of it outside them, and its health. Threads share it.
+    """An open database: its transactions, cheap checks without one, and its health; threads share it.
 
-    `name` is what messages call it; `found`: it is only read, at the revision that it was found at. `url` is the address by
-    which another process opens it, which may hold a password; `path` its file, None where it is on a server; `journal_mode`
-    is SQLite's.
+    `name` is its name in messages; `found`: it is only read, at the revision at which it was found. `url` is the
+    address by which another process opens it, which may hold a password; `path` its file, None if it is on a server;
+    `journal_mode` is SQLite's.
     """
 
     url: str
@@ -191,9 +191,10 @@ class Database(ABC):
 
     @contextmanager
     def reading(self) -> Iterator[Connection]:
-        """A connection that sees one state of the database until the block ends. Keep it short: a log grows meanwhile.
+        """A read transaction: its connection sees one state of the database until the block ends. Keep it short,
+        because the log grows meanwhile.
 
-        Raises DatabaseTooOld where what is asked for came with a later revision than a database was found at.
+        Raises DatabaseTooOld if a query needs a later revision than that at which the database was found.
         """
         self._refuse_closed()
         try:
@@ -209,7 +210,7 @@ class Database(ABC):
 
     @abstractmethod
     def _read(self) -> AbstractContextManager[Connection]:
-        """A transaction that reads."""
+        """The engine's read transaction."""
 
     def _revision(self) -> str | None:
         with self._read() as connection:
@@ -220,7 +221,7 @@ class Database(ABC):
             raise StorageUnavailable(f"{self.name} has been closed")
 
     def where(self, check: Callable[[Connection], object]) -> Self:
-        """The database itself; closed where the check of what is read of it raises an error."""
+        """The database itself, after `check` of its content; closed if the check raises an error."""
         try:
             with self.reading() as connection:
                 check(connection)
@@ -231,32 +232,32 @@ class Database(ABC):
 
     @abstractmethod
     def writing(self, *, of: str | None = None) -> AbstractContextManager[Connection]:
-        """A connection that alone writes: committed when the block ends, rolled back on any exception.
+        """A write transaction: committed when the block ends, rolled back on any exception.
 
-        `of` names a clutch, or another thing of which alone the block writes: where the database can have several writers
-        at once, it is then the only one of that thing. None: the only one of all.
-
-        Raises DatabaseBusy where another writes for too long, StorageUnavailable where the database cannot be written.
+        `of` names a clutch, or another thing that the block alone writes: if the database allows several writers at
+        once, no other writes this thing meanwhile. None: no other writes at all. Raises DatabaseBusy if another writes
+        for too long, StorageUnavailable if the database cannot be written.
         """
 
     def shared_answer(self, clutch_id: str, name: str, release: str) -> SharedAnswer | None:  # noqa: ARG002
-        """The last answer of that name that a service of that build computed; None where there is none, and of a file, which
-        has one service."""
+        """The last shared answer of that name from a service of that build; None if there is none, and always on a
+        file, which has one service."""
         return None
 
     def share(self, answer: SharedAnswer) -> None:  # noqa: B027  (a file's service keeps its own)
-        """Keep an answer for all services on the database, unless one of a later revision is kept."""
+        """Store an answer for all services on the database, unless one of a later revision is stored."""
 
     @abstractmethod
     def faults(self, *, least_free: int) -> dict[str, str]:
-        """What keeps the database (`database`) or its disk (`disk`) from being used, in words; empty where nothing does.
+        """Faults that keep the database (`database`) or its disk (`disk`) from being used, each a sentence; empty if
+        there are none.
 
         `least_free` [byte] must be free on the disk. Nothing is written, and no lock is taken or waited for.
         """
 
     @abstractmethod
     def damage(self, connection: Connection) -> list[str]:
-        """What is wrong with the content of the storage below the rows, in words; empty where nothing is."""
+        """Damage to the storage below the rows, each a sentence; empty if there is none."""
 
     @abstractmethod
     def close(self) -> None:
@@ -267,7 +268,8 @@ class Database(ABC):
 def translated_by(
     own: Callable[[Exception], StorageError | None], kinds: tuple[type[Exception], ...]
 ) -> Iterator[None]:
-    """Raise the store's own error for what driver and pool raise inside; what has none (a constraint, bad SQL) passes."""
+    """Context that raises errors of driver and pool as the StorageError from `own`; others (a constraint, bad SQL) pass
+    unchanged."""
     try:
         yield
     except kinds as error:

@@ -3,15 +3,15 @@
 
 
 class StorageError(Exception):
-    """The base of everything that the store itself raises."""
+    """Base class of all errors that the storage itself raises."""
 
 
 class DatabaseBusy(StorageError):
-    """Another writer held the lock for longer than the store waits: nothing was written, a repeat may succeed."""
+    """Another writer held the lock for too long: nothing was written, and a repeat may succeed."""
 
 
 class StorageUnavailable(StorageError):
-    """The database cannot be used now: it is unreachable, read-only, damaged or none, or its disk is full."""
+    """The database cannot be used now: it is unreachable, read-only, damaged or no database, or its disk is full."""
 
 
 class RawStoreUnavailable(StorageUnavailable):
@@ -23,7 +23,7 @@ class DatabaseTooNew(StorageError):
 
 
 class DatabaseTooOld(StorageError):
-    """The database is at an earlier revision than what is asked of it, and is only read."""
+    """The database, opened read-only, is at an earlier revision than the query needs."""
 
 
 class ServiceRuns(StorageError):
@@ -31,20 +31,20 @@ class ServiceRuns(StorageError):
 
 
 class UnfinishedMigration(StorageError):
-    """The database holds the beginning of another's content."""
+    """The database holds an incomplete copy of another database."""
 
 
 class TargetInUse(StorageError):
-    """The target of a migration holds something else."""
+    """The target of a migration already has other content."""
 
 
 class UnstorableText(StorageError):
-    """Text holds a character that the database does not have."""
+    """Text holds a character that the database cannot store."""
 
 
 class DamagedData(StorageError):
-    """A stored array does not decode to what was stored."""
+    """Stored data fail their checksum or cannot be decoded."""
 
 
 class MissingBlob(DamagedData):
-    """A store of raw records does not have what a row names."""
+    """A store of raw records lacks a blob that a row names."""

@@ -14,7 +14,7 @@ _SERVER_TABLES = ("commits", "shared_answer")
 
 
 def refuse_newer(revision: str | None) -> None:
-    """Raise DatabaseTooNew on a revision that this code does not know."""
+    """Raise DatabaseTooNew if this code does not know the revision."""
     if revision is not None and revision not in revisions():
         raise DatabaseTooNew(
             f"the database is at revision {revision}, this release knows only up to {head()}: use a newer release"
@@ -22,7 +22,8 @@ def refuse_newer(revision: str | None) -> None:
 
 
 def other_schema(connection: Connection) -> list[str]:
-    """How the schema differs from this code's; empty where it does not. Raises DatabaseTooOld on an earlier revision's."""
+    """The differences between the database's schema and this code's; empty if there are none. Raises DatabaseTooOld at
+    an earlier revision."""
     from alembic.autogenerate import compare_metadata  # start-up time: only `verify` compares schemas
     from alembic.migration import MigrationContext  # start-up time
 
@@ -43,7 +44,7 @@ _pending = Table("migration_pending", _own, Column("source", TEXT, primary_key=T
 
 
 def pending(connection: Connection) -> str | None:
-    """The source that the database is being filled from; None where it is complete."""
+    """The source from which the database is being filled; None if it is complete."""
     if not inspect(connection).has_table(_pending.name):
         return None
     return str(connection.execute(select(_pending.c.source)).scalar_one())
@@ -56,12 +57,12 @@ def mark(connection: Connection, source: str) -> None:
 
 
 def release(connection: Connection) -> None:
-    """The database is complete."""
+    """Mark the database as complete."""
     _own.drop_all(connection)
 
 
 def refuse_pending(connection: Connection) -> None:
-    """Raise UnfinishedMigration where the database is incomplete."""
+    """Raise UnfinishedMigration if the database is incomplete."""
     source = pending(connection)
     if source is not None:
         raise UnfinishedMigration(

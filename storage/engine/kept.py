@@ -10,7 +10,7 @@ from typing import Any
 
 
 class Kept:
-    """Values by name; threads share them. A value is never changed in place."""
+    """A cache of values by name, shared by threads. A value is never changed in place."""
 
     def __init__(self, most_bytes: int) -> None:
         self._most_bytes = most_bytes
@@ -19,7 +19,7 @@ class Kept:
         self._bytes = 0
 
     def get(self, name: Hashable) -> Any:
-        """The value kept under a name, None where none is."""
+        """The value cached under a name, else None."""
         with self._lock:
             if name not in self._values:
                 return None
@@ -27,7 +27,7 @@ class Kept:
             return self._values[name][0]
 
     def put(self, name: Hashable, value: object, size: int) -> None:
-        """Keep a value of about `size` bytes in place of the one of that name, unless it is larger than all may be."""
+        """Cache a value of about `size` bytes, replacing the one of that name, unless it exceeds the cache's limit."""
         with self._lock:
             self._bytes -= self._values.pop(name, (None, 0))[1]
             if size > self._most_bytes:

@@ -26,7 +26,7 @@ def open_database(url: str, *, lock_timeout: float = LOCK_TIMEOUT, serving: bool
 
 
 def open_unfinished(url: str) -> Database:
-    """As `open_database`, the target of a migration too; inside `sole_use`."""
+    """Open a database like `open_database`, also an incomplete target of a migration; call it inside `sole_use`."""
     return _opened(url, lock_timeout=LOCK_TIMEOUT, serving=not is_on_server(url))
 
 
@@ -37,7 +37,8 @@ def _opened(url: str, *, lock_timeout: float, serving: bool) -> Database:
 
 
 def find_database(url: str) -> Database:
-    """Open a database to read it as it is, whatever its revision up to this code's; nothing is made or migrated.
+    """Open a database for reading, at its present revision, which may be older than this code's; nothing is created or
+    migrated.
 
     Raises ValueError, DatabaseTooNew and UnfinishedMigration as `open_database` does, and StorageUnavailable where there is
     none.
@@ -50,7 +51,8 @@ def find_database(url: str) -> Database:
 def database_exists(url: str) -> bool:
     """Whether there is a database at the address.
 
-    Raises ValueError on an address of no kind, StorageUnavailable where a server does not answer or has none of that name.
+    Raises ValueError on an unknown kind of address, StorageUnavailable if a server does not answer or has no database
+    of that name.
     """
     if is_on_server(url):
         return server_has_tables(address_of(url))
@@ -58,9 +60,10 @@ def database_exists(url: str) -> bool:
 
 
 def service_lock(url: str) -> AbstractContextManager[None]:
-    """Held inside: the lock of the one service that may use a file. Raises ServiceRuns where another holds it.
+    """Context that holds the lock of the one service that may use a database file. Raises ServiceRuns if another holds
+    it.
 
-    Any number of services may use a database on a server: they hold nothing here, and each its connections' lock
+    A database on a server may have any number of services; they hold no lock here, but one per connection
     (`open_database(..., serving=True)`).
     """
     if is_on_server(url):
@@ -69,10 +72,10 @@ def service_lock(url: str) -> AbstractContextManager[None]:
 
 
 def sole_use(url: str) -> AbstractContextManager[None]:
-    """Held inside: no service uses the database, nor starts to. Raises ServiceRuns where one does."""
+    """Context during which no service uses the database or starts to. Raises ServiceRuns if one uses it."""
     return migration_lock(address_of(url), LOCK_TIMEOUT) if is_on_server(url) else service_lock(url)
 
 
 def shown(url: str) -> str:
-    """The database as messages may name it, without a password."""
+    """The address for messages, without a password."""
     return shown_server(address_of(url)) if is_on_server(url) else f"the file {path_of(url).resolve()}"

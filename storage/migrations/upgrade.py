@@ -37,12 +37,12 @@ def head() -> str:
 
 @cache
 def revisions() -> frozenset[str]:
-    """All revisions that this code can bring to the head."""
+    """All revisions from which this code can migrate."""
     return frozenset(step.stem for folder in FOLDERS for step in folder.glob("s*.py"))
 
 
 def current(connection: Connection) -> str | None:
-    """The revision that the database is at; None where it is empty."""
+    """The database's revision; None if it is empty."""
     if not sa.inspect(connection).has_table(_recorded.name):
         return None
     return connection.scalar(sa.select(_recorded.c.version_num))

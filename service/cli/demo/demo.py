@@ -51,7 +51,7 @@ def demo(
 
 
 def _life(service: Service, seed: int) -> None:
-    """Post the life with its inspections, and have it diagnosed: nothing comes later that the diagnosis has not seen."""
+    """Post the life with its inspections, and have it diagnosed at its end, so that the diagnosis sees all runs."""
     from models.rig import campaign  # start-up time
     from service.cli.demo import life  # start-up time
     from service.runs import simulated  # start-up time
@@ -85,7 +85,7 @@ def _life(service: Service, seed: int) -> None:
 
 
 def _diagnosed(service: Service, clutch_id: str, end: float | None) -> None:
-    """The diagnosis of the posted life, and the prediction at half of it before and after."""
+    """The diagnosis of the posted life, and the predictions at half of it before and after adoption."""
     out.print("\nWhat does the simulation get wrong?\n", style="bold")
     halfway = {} if end is None else {"at_cycles": round(end / 2)}
     before = service.get(f"/v1/clutches/{clutch_id}/remaining-useful-life", **halfway)
@@ -124,7 +124,7 @@ def _row(prediction: JsonObject, end: float | None) -> str:
 
 
 def _inside(prediction: JsonObject, end: float | None) -> list[bool]:
-    """Whether the truth lay inside the interval, where one was given and the end of life was ahead."""
+    """Whether the interval contained the true end of life, if there was an interval and the end was still ahead."""
     low, high = (prediction["end_of_life_cycles"][quantile] for quantile in ("0.05", "0.95"))
     if low is None or end is None or prediction["as_of_cycles"] > end:
         return []
@@ -137,7 +137,7 @@ def _count(cycles: float | None) -> str:
 
 @contextmanager
 def _service(folder: Path) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
-    """A service in a process of its own, with a database of its own; stopped at the end."""
+    """Context with a service in its own process and with its own database, stopped at the end."""
     port, log = _free_port(), folder / "service.log"
     command = [sys.executable, "-m", "service.cli.main", "serve", "--port", str(port), "--log-level", "warning"]
     with log.open("wb") as file:
@@ -169,7 +169,7 @@ def _await_ready(service: Service, process: subprocess.Popen[bytes], log: Path) 
 
 
 def _free_port() -> int:
-    """The usual port where it is free, else any."""
+    """The usual port if it is free, else any free port."""
     with socket.socket() as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:

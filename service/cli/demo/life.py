@@ -43,7 +43,7 @@ _ENGAGEMENT_STREAM = 0xE6
 
 
 def runs(seed: int) -> Iterator[SimulatedRun]:
-    """All runs in rig order; torque as the oil's temperature makes it.
+    """All runs in the order of the rig, with torque at the oil's simulated temperature.
 
     Runs are made one by one. The same seed >= 0 gives the same bits. Raises ValueError on a negative seed.
     """
@@ -58,7 +58,7 @@ def runs(seed: int) -> Iterator[SimulatedRun]:
 
 
 def _looped(seed: int, truth: SimulatedClutch, cycles: int) -> SimulatedRun:
-    """The dynamic test after so many duty cycles; `runs` ages the clutch by cycles alone."""
+    """The dynamic test after this many duty cycles; `runs` ages the clutch by cycles alone."""
     rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(_STREAM, cycles)))
     record = sampled_test(truth, cycles, _TEST, rng, Sensor())
     recorded = np.any([np.abs(record.pressure - level) < _NEAR for level in _RECORDED], axis=0)
@@ -72,7 +72,8 @@ def _looped(seed: int, truth: SimulatedClutch, cycles: int) -> SimulatedRun:
 
 
 def inspections(seed: int, last: float) -> Iterator[tuple[int, Surface]]:
-    """Duty cycles up to `last` and the friction surface then, where that life's dynamic tests are made and near its end."""
+    """The duty cycles up to `last` of inspections, with the friction surface then: at the life's dynamic tests and near
+    its end."""
     truth = campaign.simulated_clutch(seed)
     for cycles in sorted({*_LOOPS_AT, int(last)}):
         if cycles <= last:
@@ -80,7 +81,7 @@ def inspections(seed: int, last: float) -> Iterator[tuple[int, Surface]]:
 
 
 def _engagement(seed: int, truth: SimulatedClutch, block: DutyBlock, cycles: int) -> Record:
-    """The record of a block's last engagement, at the temperature to which the oil is set."""
+    """The record of a block's last engagement, at the oil's set temperature."""
     drive = Drive(
         speed=block.initial_speed, limit=0.0, inertia=2 * block.energy_per_cycle / block.initial_speed**2, drag=0.0
     )
@@ -96,7 +97,8 @@ def _engagement(seed: int, truth: SimulatedClutch, block: DutyBlock, cycles: int
 
 
 def _capacity(truth: SimulatedClutch, cycles: int, fastest: float) -> Capacity:
-    """What the clutch can transfer, from a table up to a speed [rad/s]: an engagement asks thousands of times.
+    """The torque that the clutch can transfer, interpolated in a table up to a speed [rad/s]: one engagement needs
+    thousands of values.
 
     Below the protocol's lowest pressure torque goes with pressure, as for the clutch itself.
     """

@@ -17,7 +17,8 @@ from service.client.clutchlife.transport import NoLongerWantedError, Service, co
 def transmit(
     spools: Sequence[Spool], url: str, key: str | None, patience: float, prepare: Callable[[Service, Spool], object]
 ) -> None:
-    """Send what waits in the spools of one service, after `prepare`; ends the command where any stays or is refused."""
+    """Send all waiting runs of one service's spools, after `prepare`; ends the command with an error if any stays or is
+    refused."""
     sent = Sent()
     with connect(url, key=key) as http, Progress(console=err, transient=True) as progress:
         task = progress.add_task("sending", total=sum(len(spool.waiting()) for spool in spools))
@@ -51,7 +52,7 @@ def transmit(
 
 
 def _left(spools: Sequence[Spool]) -> str:
-    """How many runs wait, and where."""
+    """The number of waiting runs, and the folder that holds them."""
     count = sum(len(spool.waiting()) for spool in spools)
     return f"{'1 run waits' if count == 1 else f'{count} runs wait'} in {spools[0].folder}"
 
@@ -68,7 +69,8 @@ Report = Callable[[str], None]
 
 @dataclass(slots=True)
 class Sent:
-    """How many runs were stored, were stored already, were refused, or stay because they alone were not taken."""
+    """Counts of runs: newly stored, stored already, refused, and left in the spool because the service accepted others
+    but not them."""
 
     stored: int = 0
     duplicates: int = 0
@@ -82,8 +84,8 @@ class Sent:
 
 
 def deliver(service: Service, spool: Spool, sent: Sent, report: Report, on_run: Callable[[], None]) -> None:
-    """Send what waits in a spool, counted in `sent`; the caller holds `spool.sending`. `on_run` is called after every run
-    that still waited.
+    """Send all waiting entries of a spool and count them in `sent`; the caller holds `spool.sending`. `on_run` is
+    called after each entry that still waited.
 
     Raises ServiceAwayError where the service is away, RefusedError where it would refuse every run.
     """
@@ -103,7 +105,7 @@ def deliver(service: Service, spool: Spool, sent: Sent, report: Report, on_run: 
 
 
 def _present(service: Service, spool: Spool) -> bool:
-    """Whether the service answers at all, so that it is this run that it does not answer."""
+    """Whether the service answers at all, so that only this run gets no answer."""
     at_once = Service(http=service.http, patience=0.0)
     try:
         return at_once.get(f"/v1/clutches/{spool.clutch_id}").get("clutch_id") == spool.clutch_id
@@ -112,7 +114,7 @@ def _present(service: Service, spool: Spool) -> bool:
 
 
 def _send(service: Service, spool: Spool, entry: Entry, sent: Sent, report: Report) -> None:
-    """One entry; raises NoLongerWantedError where it waits no more, and what `deliver` raises."""
+    """Send one entry; raises NoLongerWantedError if it no longer waits, and the errors of `deliver`."""
     answer = "sent, but no answer was received"
     spool.note(entry, tries=entry.tries + 1, last_try=entries.stamp(), last_answer=answer, perhaps_stored=True)
     address = f"/v1/clutches/{spool.clutch_id}/{entry.resource}" + ("" if entry.parameters is None else "/file")
@@ -166,7 +168,7 @@ def _refused(spool: Spool, entry: Entry, error: RefusedError, report: Report) ->
 
 
 def _remarks(receipt: JsonObject, name: str, spool: Spool, *, waited: bool) -> list[str]:
-    """What the sender has to know of what was stored: that it is doubted, or not what was sent any more."""
+    """Remarks for the sender on a stored run: doubts about it, or later changes to it."""
     cycles = receipt.get("cycles")
     sent_cycles = receipt.get("sent_cycles", cycles)
     lines = []

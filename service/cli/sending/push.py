@@ -90,7 +90,7 @@ def push(
 def _request(
     file: manifest.RunFile, kind: str | None, cycles: float | None, reading: Mapping[str, str | None], rig: str | None
 ) -> tuple[Path, dict[str, str] | None]:
-    """A file and the parameters of its request, of its manifest or else of the options; None for a JSON body."""
+    """A file and its request's parameters, from its manifest or else the options; None for a JSON body."""
     if file.path.suffix == ".json":
         return file.path, None
     stated: Mapping[str, str | None]
@@ -112,7 +112,8 @@ def _replacement(spool: Spool, entry: Entry) -> str:
 
 
 def _warn_of_others(spool: Spool, digests: set[str]) -> None:
-    """One line where other runs of the clutch wait than those that were just given; refusals were said when they came."""
+    """Print one line if other runs of the clutch wait than those given to this command; refusals were reported when
+    they came."""
     other_entries = [entry for entry in spool.waiting() if entry.digest not in digests]
     if other_entries:
         oldest = min(entry.since for entry in other_entries)
@@ -121,7 +122,7 @@ def _warn_of_others(spool: Spool, digests: set[str]) -> None:
 
 
 def _record(paths: list[Path], clutch_id: str) -> JsonObject | None:
-    """What a `clutch.json` in one of the folders says of the clutch; that of another clutch says nothing of it."""
+    """The clutch's record in a `clutch.json` in one of the folders; None if there is none for this clutch."""
     for record in (path / manifest.CLUTCH_FILE for path in paths):
         body = json.loads(record.read_bytes()) if record.is_file() else {}
         if not isinstance(body, dict):
@@ -132,7 +133,7 @@ def _record(paths: list[Path], clutch_id: str) -> JsonObject | None:
 
 
 def _require_known(url: str, key: str | None, clutch_id: str) -> None:
-    """End the command, before anything is kept, where the service says that it knows no such clutch: it may be mistyped."""
+    """End the command, before anything is kept, if the service does not know the clutch: its id may be mistyped."""
     with connect(url, key=key) as http:
         try:
             Service(http=http, patience=0.0).get(f"/v1/clutches/{clutch_id}")
@@ -144,7 +145,7 @@ def _require_known(url: str, key: str | None, clutch_id: str) -> None:
 
 
 def _register(service: Service, clutch_id: str, record: JsonObject | None) -> None:
-    """Register the clutch from its record; without one it must be registered already."""
+    """Register the clutch from its record; without a record it must be registered already."""
     if record is None:
         service.get(f"/v1/clutches/{clutch_id}")
     else:
@@ -227,7 +228,7 @@ def empty(
 
 
 def _spooled_entries(folder: Path, clutch: str | None) -> list[Entry]:
-    """Everything in the spools, of one clutch where it is given."""
+    """All entries in the spools, or those of one clutch."""
     if folder.exists() and not folder.is_dir():
         options.fail(f"{folder} is not a folder", options.EX_DATAERR)
     spools = [spool for spool in Spool.every(folder) if clutch in (None, spool.clutch_id)]
@@ -260,7 +261,7 @@ def _item(folder: Path, entry: Entry) -> JsonObject:
 
 
 def _print(folder: Path, kept: list[Entry]) -> None:
-    """A line a clutch, and a line a run."""
+    """Print one line per clutch and one per run."""
     for (url, clutch_id), entries in groupby(kept, _owner):
         options.print_line(f"{clutch_id} at {url}, in {folder}")
         for entry in entries:

@@ -51,7 +51,7 @@ _DESCRIBING = ("run_id", "kind", "cycles", "started_at", "origin")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunHead:
-    """A run's name, kind, cycles and start as stated (None where not), and a hash of everything else where a start is."""
+    """A run's name, kind, cycles and start as stated (None if not), and a hash of everything else if a start is stated."""
 
     run_id: str | None = None
     kind: str | None = None
@@ -61,7 +61,7 @@ class RunHead:
 
 
 def head_of_body(body: bytes) -> RunHead:
-    """The head of a JSON body; an empty one where it is not a run: the service will say so."""
+    """The head of a JSON body; empty if it is not a run, which the service will report."""
     try:
         run = json.loads(body, parse_int=float)  # 7000 is 7000.0
     except (ValueError, RecursionError):
@@ -96,10 +96,10 @@ def _filled(value: object) -> str | None:
 
 
 def same_run(older: RunHead, newer: RunHead, *, same_file: bool) -> bool:
-    """Whether two contents are versions of one run: by name where both state one, else by the file that they come from.
+    """Whether two contents are versions of one run: by name if both state one, else by their source file.
 
-    A recorder may write every run into the same file: where both state a start, and starts and measurements differ, they are
-    two runs.
+    A recorder may write every run into the same file: if both state a start, and starts and measurements differ, they
+    are two runs.
     """
     if older.run_id is not None and newer.run_id is not None:
         return older.run_id == newer.run_id
@@ -109,7 +109,7 @@ def same_run(older: RunHead, newer: RunHead, *, same_file: bool) -> bool:
 
 
 def _instant(head: RunHead) -> datetime | str | None:
-    """The start, the same in every time zone; as stated where it is no time with one: the service will say so."""
+    """The start in UTC; unchanged if it is no time with a time zone, which the service will report."""
     try:
         return datetime.fromisoformat(head.started_at or "").astimezone(UTC)
     except (ValueError, OverflowError):
@@ -118,10 +118,10 @@ def _instant(head: RunHead) -> datetime | str | None:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Entry:
-    """One run or inspection: its place in the order in which they came, and what tells its content from others'.
+    """A waiting run or inspection: its number in order of arrival, and its content's digest.
 
-    `failures`: tries at which the service was there and did not take the run; `perhaps_stored`: a try may have been carried
-    out without an answer; `problem`: why it was refused.
+    `failures`: tries that the present service did not accept; `perhaps_stored`: a try may have succeeded without an
+    answer; `problem`: the reason of its refusal.
     """
 
     number: int
@@ -147,7 +147,7 @@ class Entry:
 
     @property
     def label(self) -> str:
-        """How a person would call the run."""
+        """The entry's name for messages."""
         files = ", ".join(Path(source).name for source in self.sources)
         return self.head.run_id or files or self.body
 
@@ -162,7 +162,7 @@ def _body(number: int, digest: str) -> str:
 
 
 def _put(database: sqlite3.Connection, entry: Entry) -> None:
-    """Store an entry, in the place of the one of its number."""
+    """Store an entry, replacing the one with its number."""
     values = asdict(entry)
     columns = [values.pop(name) for name in _COLUMNS]
     known = json.dumps(values, ensure_ascii=False)
@@ -185,9 +185,10 @@ class HeldError(Exception):
 
 @contextmanager
 def _opened(path: Path, patience: float) -> Iterator[sqlite3.Connection]:
-    """The database in a file, which is made; HeldError where another process holds it for longer than `patience` [s].
+    """The open database of a file, created if needed; HeldError if another process holds it for longer than `patience`
+    [s].
 
-    Its other errors are OSError, as where the disk is full, the file is damaged, or the file system keeps no locks.
+    Its other errors become OSError: the disk is full, the file is damaged, or the file system has no locks.
     """
     try:
         with closing(sqlite3.connect(path, timeout=patience, isolation_level=None)) as database:
@@ -199,13 +200,13 @@ def _opened(path: Path, patience: float) -> Iterator[sqlite3.Connection]:
 
 
 def _there(database: sqlite3.Connection, entry: Entry) -> Entry | None:
-    """An entry as it is now; None where it waits no more."""
+    """The present state of an entry; None if it no longer waits."""
     row = database.execute(_THERE, (entry.number, entry.digest)).fetchone()
     return None if row is None else _entry(row)
 
 
 def _read(folder: Path, query: str, *values: str) -> list[tuple[Any, ...]]:
-    """Rows of a folder's database; none where nothing was ever kept."""
+    """Rows of a folder's database; empty if there is none."""
     path = folder / DATABASE
     if not path.is_file() or path.stat().st_size == 0:
         return []
@@ -214,7 +215,7 @@ def _read(folder: Path, query: str, *values: str) -> list[tuple[Any, ...]]:
 
 
 def _sync(folder: Path) -> None:
-    """A rename is on the disk; where folders cannot be opened (Windows), the file system sees to it."""
+    """Write a rename in this folder to disk; does nothing where folders cannot be opened (Windows)."""
     if os.name == "posix":
         handle = os.open(folder, os.O_RDONLY)
         try:
@@ -231,7 +232,7 @@ def default_folder() -> Path:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Spool:
-    """What a folder keeps for one clutch at one service."""
+    """A folder's queue of runs to send, for one clutch at one service."""
 
     folder: Path
     url: str
@@ -243,12 +244,12 @@ class Spool:
 
     @classmethod
     def every(cls, folder: Path) -> list["Spool"]:
-        """All spools of a folder that hold anything."""
+        """All non-empty spools of a folder."""
         owners = _read(folder, "SELECT DISTINCT url, clutch_id FROM entry ORDER BY url, clutch_id")
         return [cls(folder=folder, url=url, clutch_id=clutch_id) for url, clutch_id in owners]
 
     def waiting(self) -> list[Entry]:
-        """What is to be sent, in the order in which it came; what failed inside the service comes last."""
+        """The entries to send, in order of arrival; entries that failed inside the service come last."""
         return sorted(self._in_state(WAITING), key=lambda entry: entry.failures)
 
     def refused(self) -> list[Entry]:
@@ -265,12 +266,12 @@ class Spool:
         return self.folder / entry.body
 
     def awaits(self, entry: Entry) -> bool:
-        """Whether an entry is still to be sent: it was not sent by another process, and no newer version came."""
+        """Whether an entry is still to be sent: no other process sent it, and no newer version replaced it."""
         with self._changing() as database:
             return _there(database, entry) is not None
 
     def begin(self) -> None:
-        """Finish what a killed process began; to be called before the first run is sent."""
+        """Repair the spool after a killed process; call it before the first run is sent."""
         with self._changing() as database:
             numbers = {_body(*row): row[0] for row in database.execute("SELECT number, digest FROM entry")}
             names = {path.name for path in self.folder.iterdir() if path.suffix in (BODY, PARTIAL)}
@@ -314,7 +315,7 @@ class Spool:
     def _copied(
         self, database: sqlite3.Connection, path: Path, parameters: Mapping[str, str] | None, resource: str
     ) -> Entry:
-        """The bytes of a run copied into the spool; its entry is still to be stored."""
+        """Copy a run's bytes into the spool; returns its entry, not yet stored."""
         (number,) = database.execute("SELECT coalesce(max(number), 0) + 1 FROM entry").fetchone()
         partial = self.folder / f"{number:08d}{PARTIAL}"
         sha256 = hashlib.sha256()
@@ -345,14 +346,14 @@ class Spool:
         return entry
 
     def note(self, entry: Entry, **changes: Any) -> None:
-        """Change what is known of an entry, if it still waits. A full disk must not keep runs from being sent."""
+        """Update an entry's fields if it still waits. Errors are ignored, because a full disk must not prevent sending."""
         with suppress(OSError), self._changing() as database:
             current = _there(database, entry)
             if current is not None:
                 _put(database, replace(current, **changes))
 
     def done(self, entry: Entry) -> bool:
-        """Remove an entry that the service has stored, and its copies refused or replaced; whether it still waited."""
+        """Remove an entry stored by the service, with its refused or replaced copies; true if it still waited."""
         with self._changing() as database:
             waited = _there(database, entry) is not None
             numbers = database.execute(_COPIES, (self.url, self.clutch_id, entry.digest, entry.number)).fetchall()
@@ -360,7 +361,7 @@ class Spool:
             return waited
 
     def refuse(self, entry: Entry, problem: JsonObject) -> Path | None:
-        """Set aside an entry that the service refuses, with the answer; where it is, None where it waits no more."""
+        """Set a refused entry aside with the service's answer; returns its path, None if it no longer waits."""
         with self._changing() as database:
             current = _there(database, entry)
             if current is None:
@@ -369,19 +370,20 @@ class Spool:
             return self.body(current)
 
     def discard(self, entries: Iterable[Entry]) -> None:
-        """Delete entries for good, in whatever state."""
+        """Delete entries for good, in any state."""
         with self._changing() as database:
             self._remove(database, [(entry.number, entry.body) for entry in entries])
 
     def _remove(self, database: sqlite3.Connection, entries: Sequence[tuple[int, str]]) -> None:
-        """Delete entries by their numbers and the names of their bytes; these first, which makes room on a full disk."""
+        """Delete entries by number and file name; the files first, to make room on a full disk."""
         for _, name in entries:
             (self.folder / name).unlink(missing_ok=True)
         database.executemany("DELETE FROM entry WHERE number = ?", [(number,) for number, _ in entries])
 
     @contextmanager
     def sending(self, patience: float) -> Iterator[None]:
-        """Be the only process that sends from this spool; HeldError where another is for longer than `patience` [s]."""
+        """Context in which no other process sends from this spool; HeldError if another does for longer than `patience`
+        [s]."""
         self.folder.mkdir(parents=True, exist_ok=True)
         name = hashlib.sha256(f"{self.url}\n{self.clutch_id}".encode()).hexdigest()[:_LOCK_DIGITS]
         with _opened(self.folder / f"{name}.lock", patience) as lock:
@@ -390,7 +392,7 @@ class Spool:
 
     @contextmanager
     def _changing(self) -> Iterator[sqlite3.Connection]:
-        """A transaction, while which no other process changes the folder; once it has ended it is on the disk."""
+        """A transaction during which no other process changes the folder; it is on disk once it has ended."""
         self.folder.mkdir(parents=True, exist_ok=True)
         with _opened(self.folder / DATABASE, _PATIENCE) as database:
             database.execute(_DURABLE)
@@ -401,7 +403,7 @@ class Spool:
 
 
 def _digest(path: Path, parameters: Mapping[str, str] | None) -> str:
-    """What tells a run's content from others': a hash of its bytes, and of the parameters that are sent with them."""
+    """A run's content digest: a hash of its bytes and of the parameters sent with them."""
     with path.open("rb") as file:
         sha256 = hashlib.file_digest(file, "sha256")
     if parameters is not None:

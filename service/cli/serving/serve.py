@@ -110,9 +110,9 @@ def serve(
 
 
 def _allowed(host: str, settings: "Settings") -> str:
-    """The address to listen at, this machine's own where there are no keys; what is odd about the keys is logged.
+    """The address to listen at; this machine's own if no key exists. Logs warnings about missing or expired keys.
 
-    Raises ServiceRuns where another service uses the database, and what `open_database` raises.
+    Raises ServiceRuns if another service uses the database, and the errors of `open_database`.
     """
     from service.changes import raw_records  # start-up time
     from service.readers.confinement import missing  # start-up time
@@ -156,9 +156,9 @@ def _end(*_: object) -> NoReturn:
 
 
 def bound(host: str, port: int) -> list[socket.socket]:
-    """Sockets at the port, one for each address that the host's name has; port 0 takes a free one.
+    """Sockets bound to the port, one for each address of the host's name; port 0 takes a free one.
 
-    Raises OSError, a line that says what to do, where the port is not free or is none of this machine's to take.
+    Raises OSError with a line of advice if the port is taken or this machine may not use it.
     """
     with ExitStack() as open_sockets:
         sockets: list[socket.socket] = []

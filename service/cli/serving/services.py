@@ -30,7 +30,7 @@ _HUNG_SECONDS = 60
 
 
 def prepared(settings: Settings) -> FastAPI:
-    """The application; from now on this process does nothing but serve it."""
+    """The application; from now on this process only serves it."""
     use_one_blas_thread()  # the arrays are small: threads that wait for each other cost more than they gain
     app = create_app(settings)
     allow_many()
@@ -53,7 +53,7 @@ class _OneOfSeveral(uvicorn.Config):
 
 
 class _Server(uvicorn.Server):
-    """A server that calls `announce` once it answers."""
+    """A server that calls `announce` once it accepts requests."""
 
     def __init__(self, config: uvicorn.Config, announce: Callable[[], None]) -> None:
         super().__init__(config)
@@ -67,7 +67,7 @@ class _Server(uvicorn.Server):
 def serve_one(
     settings: Settings, sockets: list[socket.socket], options: dict[str, Any], announce: Callable[[], None]
 ) -> bool:
-    """Serve in this process; `announce` is called once the service answers. Whether it could start."""
+    """Serve in this process; `announce` is called once the service accepts requests. Returns whether it could start."""
     config = uvicorn.Config(prepared(settings), http=bounded(settings.connections_at_once), **options)
     server = _Server(config, announce)
     with suppress(KeyboardInterrupt):  # the server has stopped on it already
@@ -76,7 +76,7 @@ def serve_one(
 
 
 def serve_several(settings: Settings, processes: int, sockets: list[socket.socket], options: dict[str, Any]) -> bool:
-    """Serve in so many processes, which share the port; one that ends is replaced. Whether all could start."""
+    """Serve in this many processes, which share the port; one that ends is replaced. Returns whether all could start."""
     settings.to_environment()
     application = f"{__name__}:{one_of_several.__name__}"
     config = _OneOfSeveral(
@@ -95,7 +95,7 @@ def serve_several(settings: Settings, processes: int, sockets: list[socket.socke
 
 
 def one_of_several() -> FastAPI:
-    """The application in one of the processes, which end with their parent however that ends."""
+    """The application in one of several processes, which ends with its parent process for whatever reason."""
     settings = Settings.from_environment()
     end_with_parent(partial(os.kill, os.getpid(), signal.SIGTERM))
     return prepared(settings)

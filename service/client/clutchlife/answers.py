@@ -39,7 +39,7 @@ _MAX_QUOTED = 500
 
 
 class ClutchlifeError(Exception):
-    """Base of what the client raises. `problem` is the service's report (RFC 9457), empty where there is none."""
+    """Base class of the client's errors. `problem` is the service's report (RFC 9457), empty where there is none."""
 
     problem: JsonObject
 
@@ -51,7 +51,7 @@ class ClutchlifeError(Exception):
 class ServiceAwayError(ClutchlifeError):
     """The service did not answer, or was busy, for longer than the patience.
 
-    `perhaps_stored`: a try reached a server and got no answer of the service, so it may have been carried out.
+    `perhaps_stored`: a try reached a server without an answer, so it may have been carried out.
     """
 
     def __init__(self, message: str, *, perhaps_stored: bool = True, problem: JsonObject | None = None) -> None:
@@ -68,7 +68,7 @@ _SUGGESTED = ("table", "time", "decimal", "missing", "good", "kind", "cycles", "
 
 
 class RefusedError(ClutchlifeError):
-    """The service refused the request; repeating it would be refused again. `problem["errors"]` says what is wrong where."""
+    """The service refused the request; repeating it would not help. `problem["errors"]` lists the wrong places."""
 
     def __init__(self, status: int, problem: JsonObject) -> None:
         reason = str(problem.get("detail") or problem.get("title") or "refused")
@@ -77,7 +77,7 @@ class RefusedError(ClutchlifeError):
 
     @property
     def of_the_run(self) -> bool:
-        """Whether the service itself says that this run's content is refused; a proxy's 4xx does not."""
+        """Whether the service itself refuses this run's content, in contrast to a proxy's 4xx."""
         return 400 <= self.status < 500 and self.problem.get("type") in _OF_THE_RUN
 
     @property
@@ -87,23 +87,24 @@ class RefusedError(ClutchlifeError):
 
     @property
     def suggestion(self) -> JsonObject | None:
-        """How a refused file may be read, for you to confirm (`Client.confirm_suggestion`); None: nothing is suggested."""
+        """A suggested way to read a refused file, for you to confirm (`Client.confirm_suggestion`); None: nothing is
+        suggested."""
         held = self.problem.get("suggestion")
         return held if isinstance(held, dict) else None
 
     @property
     def unknown(self) -> bool:
-        """Whether the service itself says that there is nothing of that name."""
+        """Whether the service itself reports that nothing has that name."""
         return self.problem.get("type") == _UNKNOWN
 
     @property
     def other_content(self) -> bool:
-        """Whether the service holds other content under the run's name."""
+        """Whether the service has other content stored under the run's name."""
         return self.problem.get("type") == _CONFLICT
 
 
 def suggested(suggestion: JsonObject) -> str:
-    """A suggestion in a line: its columns, clock, run and first row."""
+    """A suggestion as one line: its columns, clock, run and first row."""
     parts = [f"{channel} from {title}" for channel, title in suggestion["map"].items()]
     stated = {name: suggestion[name] for name in _SUGGESTED if suggestion.get(name) not in (None, "")}
     parts += [f"{name} {value:g}" if isinstance(value, float) else f"{name} {value}" for name, value in stated.items()]
@@ -112,7 +113,8 @@ def suggested(suggestion: JsonObject) -> str:
 
 
 def passing(response: "httpx2.Response", answer: object | None) -> str | None:
-    """Why the answer, with what was read in it, is none of the service's or means "not now"; None where it is final."""
+    """Why a response is temporary or not from the service, so that the request is retried; None if the response is
+    final."""
     status = response.status_code
     if status < 300:
         if answer is not None:
@@ -128,7 +130,7 @@ def passing(response: "httpx2.Response", answer: object | None) -> str | None:
 
 
 def perhaps_stored(response: "httpx2.Response") -> bool:
-    """Whether the service may have carried out a request that got this passing answer."""
+    """Whether the service may have carried out a request although it got this temporary response."""
     return response.status_code not in _STORED_NOTHING
 
 
@@ -140,7 +142,7 @@ class ServiceAnswer(JsonObject):
 
 
 def content(response: "httpx2.Response") -> ServiceAnswer | None:
-    """The JSON object of an answer; None where it holds none."""
+    """The JSON object of a response; None if it holds none."""
     try:
         answer = response.json()
     except (ValueError, RecursionError):
@@ -149,26 +151,26 @@ def content(response: "httpx2.Response") -> ServiceAnswer | None:
 
 
 def csv(response: "httpx2.Response") -> str | None:
-    """The rows of an answer that is a table; None where it is none."""
+    """The rows of a CSV response; None for any other."""
     return response.text if response.headers.get("Content-Type", "").startswith("text/csv") else None
 
 
 def image(response: "httpx2.Response") -> bytes | None:
-    """The file of an answer that is a photograph or a run's file; None where it is none."""
+    """The file of a response that is a photograph or a run's file; None for any other."""
     media = response.headers.get("Content-Type", "")
     return response.content if media.startswith(("image/", "application/octet-stream")) else None
 
 
 def problem(response: "httpx2.Response") -> JsonObject:
-    """The problem report of a refusal, or its text as one."""
+    """A refusal's problem report, made from its text if it has none."""
     report = content(response)
     return {"detail": response.text[:_MAX_QUOTED]} if report is None else report
 
 
 def retry_after(headers: Mapping[str, str], *, now: datetime | None = None) -> float:
-    """Seconds that `Retry-After` asks to wait: a number of them or a date (RFC 9110, section 10.2.3); 0 where it is neither.
+    """Seconds to wait by `Retry-After`, a number or a date (RFC 9110, section 10.2.3); 0 if it is neither.
 
-    A date counts from the answer's own `Date`, so that a wrong clock on this side does not matter.
+    A date counts from the response's own `Date`, so that a wrong clock on this side does not matter.
     """
     text = headers.get("Retry-After", "").strip()
     if text.isascii() and text.isdigit():

@@ -24,11 +24,11 @@ _JSON_SUFFIX = ".json"
 
 
 class Client:
-    """A running service. Where a request is refused, RefusedError carries the service's problem report; where the service is
-    away for longer than `patience` [s], ServiceAwayError is raised.
+    """A client for a running service. A refused request raises RefusedError with the service's problem report; if the
+    service is away for longer than `patience` [s], ServiceAwayError is raised.
 
-    Lists are tables: frames of pandas, else of polars, else lists of dictionaries; `frames` asks for one of them. Threads
-    may share a client.
+    Lists are tables: frames of pandas, else of polars, else lists of dictionaries; `frames` selects one of them.
+    Threads may share a client.
     """
 
     def __init__(
@@ -60,22 +60,23 @@ class Client:
     # --- clutches ---
 
     def clutches(self, **arguments: Any) -> Any:
-        """All clutches as a table, what needs somebody first; `archived=True`: the archived ones."""
+        """All clutches as a table, the most urgent first; `archived=True`: the archived ones."""
         return self._table("/v1/clutches", **arguments)
 
     def clutch(self, clutch_id: str) -> JsonObject:
-        """One clutch: its record, its state and its remaining life in short."""
+        """One clutch: its record, its state, and a summary of its remaining life."""
         return self.service.get(_clutch(clutch_id))
 
     def register(self, clutch_id: str, **record: Any) -> JsonObject:
-        """Register a clutch; what is left out has the reference's values. The same again changes nothing."""
+        """Register a clutch; omitted fields have the reference's values. Registering the same clutch again changes
+        nothing."""
         return self.service.post("/v1/clutches", {"clutch_id": clutch_id, **record})
 
     # --- runs ---
 
     def runs(self, clutch_id: str, **arguments: Any) -> Any:
-        """A clutch's runs as a table, by cycles, a row a run; `state="held"`: those that wait for a person. In a frame its
-        fits and loops are left out: `stribeck` and `loops` have them."""
+        """A clutch's runs as a table by cycles, one row per run; `state="held"`: those that wait to be confirmed. A
+        frame leaves out fits and loops: `stribeck` and `loops` have them."""
         return self._table(f"{_clutch(clutch_id)}/runs", without=("fits", "loops"), **arguments)
 
     def run(self, clutch_id: str, run_id: str, **arguments: Any) -> JsonObject:
@@ -83,7 +84,7 @@ class Client:
         return self.service.get(f"{_clutch(clutch_id)}/runs/{quote(run_id, safe='')}", **arguments)
 
     def post_run(self, clutch_id: str, run: Mapping[str, Any] | str | Path | None = None, **fields: Any) -> JsonObject:
-        """Send a run; its receipt. Safe to repeat.
+        """Send a run; returns its receipt. Safe to repeat.
 
         `run` is its content, or its file: JSON, or a recorder's file with `kind` and `cycles` or a `rig`. Instead of or
         beside a content its `fields` may be given, as `kind="maintenance", event="oil_change", cycles=7000`; `channels` may
@@ -105,8 +106,8 @@ class Client:
     def confirm_suggestion(
         self, clutch_id: str, run: str | Path, refused: RefusedError, rig: str | None = None, **fields: Any
     ) -> JsonObject:
-        """Send a file again as its refusal suggests; its receipt. `rig`: a new name, under which the reading is kept for the
-        next files. `fields`, such as `cycles`, come before what is suggested.
+        """Send a file again with the reading that its refusal suggested; returns its receipt. `rig`: a new name, under
+        which the reading is kept for the next files. `fields`, such as `cycles`, come before what is suggested.
 
         Raises ValueError where nothing was suggested.
         """
@@ -116,13 +117,13 @@ class Client:
         return self.post_run(clutch_id, run, **{**said, "rig": rig, **fields})
 
     def confirm(self, clutch_id: str, *run_ids: str, reason: str = "") -> JsonObject:
-        """Accept held runs as they were sent, all of them in one step; their receipts are in `items`."""
+        """Accept held runs as they were sent, in one step; their receipts are in `items`."""
         return self.service.post(f"{_clutch(clutch_id)}/runs/confirm", {"run_ids": run_ids, "reason": reason})
 
     # --- what is known ---
 
     def remaining_useful_life(self, clutch_id: str, **arguments: Any) -> JsonObject:
-        """The duty cycles that remain, with quantiles; arguments are those of the API: `method`, `at_cycles`, ..."""
+        """The remaining duty cycles with quantiles; arguments are those of the API: `method`, `at_cycles`, ..."""
         return self.service.get(f"{_clutch(clutch_id)}/remaining-useful-life", **arguments)
 
     def forecast(self, clutch_id: str, programme: Any, **fields: Any) -> JsonObject:
@@ -131,11 +132,11 @@ class Client:
         return self.service.post(address, {"programme": list(programme), **fields})
 
     def degradation(self, clutch_id: str, **arguments: Any) -> JsonObject:
-        """The coefficients of every tracked quantity's course, with their uncertainty."""
+        """The coefficients of eq. 6 for every tracked quantity, with their uncertainty."""
         return self.service.get(f"{_clutch(clutch_id)}/degradation", **arguments)
 
     def stribeck(self, clutch_id: str, **arguments: Any) -> Any:
-        """The fitted curves of all stationary tests as a table; in a frame a row a curve, by test and pressure."""
+        """The fitted curves of all stationary tests as a table; a frame has one row per curve, by test and pressure."""
         return self._table(f"{_clutch(clutch_id)}/stribeck", row_of="fits", **arguments)
 
     def loops(self, clutch_id: str, **arguments: Any) -> Any:
@@ -143,7 +144,8 @@ class Client:
         return self._table(f"{_clutch(clutch_id)}/loops", **arguments)
 
     def series(self, clutch_id: str, **arguments: Any) -> Any:
-        """Every quantity over cycles as flat rows; `source`: of one "run" alone, or the "track" of all up to there."""
+        """Every quantity over cycles as flat rows; `source`: "run" for values of one run, "track" for values tracked
+        over all runs up to it."""
         return self._table(f"{_clutch(clutch_id)}/series", **arguments)
 
     # --- diagnoses ---
@@ -151,9 +153,9 @@ class Client:
     def diagnose(
         self, clutch_id: str, *, adopt: bool = False, isolability: bool = False, wait: float = 600.0
     ) -> JsonObject:
-        """Have a clutch diagnosed and wait for the report. Raises DiagnosisFailedError where it failed, TimeoutError where
-        it has not ended after `wait` [s]. `adopt`: the extended model is adopted if there is one; `isolability`: the report
-        says which causes these tests could tell apart."""
+        """Diagnose a clutch and wait for the report. Raises DiagnosisFailedError where it failed, TimeoutError where it
+        has not ended after `wait` [s]. `adopt`: the extended model is adopted if there is one; `isolability`: the
+        report says which causes these tests could tell apart."""
         report = diagnosed(self.service, clutch_id, adopt=adopt, isolability=isolability, wait=wait)
         if report["status"] != "finished":
             raise DiagnosisFailedError(f"the diagnosis failed: {report['problem']}", {"detail": report["problem"]})
@@ -170,19 +172,19 @@ class Client:
     # --- alarms ---
 
     def alarms(self, **arguments: Any) -> Any:
-        """The rules of alarms as a table."""
+        """The alarm rules as a table."""
         return self._table("/v1/alarms", **arguments)
 
     def add_alarm(self, quantity: str, **rule: Any) -> JsonObject:
-        """Make a rule: `add_alarm("remaining_cycles", clutch_id="e", below=4000)`."""
+        """Create a rule: `add_alarm("remaining_cycles", clutch_id="e", below=4000)`."""
         return self.service.post("/v1/alarms", {"quantity": quantity, **rule})
 
     def events(self, **arguments: Any) -> Any:
-        """What rules have raised as a table, newest first; `state="open"`: what is not over."""
+        """Alarms as a table, newest first; `state="open"`: those not cleared."""
         return self._table("/v1/alarms/events", **arguments)
 
     def acknowledge(self, event_id: str, note: str = "") -> JsonObject:
-        """Say that somebody has seen an alarm."""
+        """Acknowledge an alarm."""
         return self.service.post(f"/v1/alarms/events/{quote(event_id, safe='')}/acknowledge", {"note": note})
 
     def _table(self, address: str, *, row_of: str | None = None, without: Sequence[str] = (), **arguments: Any) -> Any:
@@ -197,7 +199,7 @@ def diagnosed(
     isolability: bool = False,
     wait: float = math.inf,
 ) -> JsonObject:
-    """The report of a diagnosis that is asked for, once it has ended. Raises TimeoutError after `wait` [s]."""
+    """Ask for a diagnosis and wait for its report. Raises TimeoutError after `wait` [s]."""
     address = f"{_clutch(clutch_id)}/diagnoses"
     deadline = time.monotonic() + wait
     report = service.post(
@@ -220,7 +222,7 @@ def _clutch(clutch_id: str) -> str:
 
 
 def _content(fields: Mapping[str, Any]) -> JsonObject:
-    """A run as JSON has it; what is None is left out."""
+    """A run's fields as JSON content; None values are left out."""
     stated = {name: value for name, value in fields.items() if value is not None}
     if "channels" in stated:
         stated["channels"] = columns(stated["channels"])

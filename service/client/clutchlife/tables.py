@@ -20,7 +20,8 @@ def table(
     row_of: str | None = None,
     without: Sequence[str] = (),
 ) -> Any:
-    """The items as rows; in frames an object within an item is columns of its own, `state.name`, and lists are cells.
+    """Items as rows of a table; in frames an object within an item becomes columns of its own, `state.name`, and lists
+    are cells.
 
     In frames an item with a list named `row_of` is a row for every member of it, an item without one a row, and the fields
     `without` are left out: methods of the client have them as tables of their own. Of warnings and doubts the codes stand
@@ -48,7 +49,7 @@ def table(
 
 
 def columns(channels: Any) -> dict[str, list[Any]]:
-    """A run's channels as the service takes them, of a frame of pandas or polars, of arrays or lists, by name."""
+    """A run's channels in the service's form, from a frame of pandas or polars, or from arrays or lists by name."""
     if not isinstance(channels, Mapping):
         channels = {str(name): channels[name] for name in channels.columns}
     return {name: _column(values) for name, values in channels.items()}

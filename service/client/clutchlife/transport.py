@@ -32,7 +32,7 @@ FIRST_WAIT, LAST_WAIT = 0.25, 15.0
 
 
 def _failure(error: "httpx2.RequestError") -> tuple[str, bool]:
-    """A failed request in words, without the library's names, and whether a byte of the request may have left."""
+    """A failed request in words, without the library's names, and whether any byte of it may have been sent."""
     import httpx2  # start-up time
 
     if isinstance(error, httpx2.ConnectError | httpx2.ConnectTimeout | httpx2.PoolTimeout):
@@ -41,28 +41,29 @@ def _failure(error: "httpx2.RequestError") -> tuple[str, bool]:
 
 
 class NoLongerWantedError(Exception):
-    """What was to be sent is not to be sent any more."""
+    """The content no longer has to be sent."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Service:
-    """A running service. `patience` [s] is how long one request is tried again while the service is away or busy."""
+    """The HTTP interface of a running service. `patience` [s]: for how long a request is retried while the service is
+    away or busy."""
 
     http: "httpx2.Client"
     patience: float = 60.0
     on_wait: Callable[[str, float], None] = lambda _reason, _seconds: None
 
     def post(self, path: str, content: Mapping[str, Any], *, prefer: str | None = None) -> JsonObject:
-        """The answer to a body of JSON; raises ServiceAwayError or RefusedError."""
+        """The answer to a POST of JSON; raises ServiceAwayError or RefusedError."""
         headers = JSON if prefer is None else JSON | {"Prefer": prefer}
         return self._answer("POST", path, content=_body(content), headers=headers)
 
     def put(self, path: str, content: Mapping[str, Any]) -> JsonObject:
-        """The answer to a body of JSON that replaces what is at `path`; raises as `post` does."""
+        """The answer to a PUT of JSON, which replaces the resource at `path`; raises as `post` does."""
         return self._answer("PUT", path, content=_body(content), headers=JSON)
 
     def patch(self, path: str, content: Mapping[str, Any]) -> JsonObject:
-        """The answer to a body of JSON that changes what is at `path`; raises as `post` does."""
+        """The answer to a PATCH of JSON, which changes the resource at `path`; raises as `post` does."""
         return self._answer("PATCH", path, content=_body(content), headers=JSON)
 
     def pages(self, path: str, **params: Any) -> Iterator[JsonObject]:
@@ -78,29 +79,29 @@ class Service:
     def post_file(
         self, path: str, file: Path, parameters: Mapping[str, str] | None, wanted: Callable[[], bool] = lambda: True
     ) -> JsonObject:
-        """The answer to a run's file, or to a JSON body where there are no parameters; raises as `post` does.
+        """The answer to a POST of a run's file, or of a JSON body if there are no parameters; raises as `post` does.
 
-        `wanted` is asked before every try; NoLongerWantedError where it says no.
+        `wanted` is called before every try; NoLongerWantedError if it returns false.
         """
         if parameters is None:
             return self._answer("POST", path, file=file, wanted=wanted, headers=JSON)
         return self._answer("POST", path, file=file, wanted=wanted, params=dict(parameters))
 
     def post_form(self, path: str, file: Path, profile: Mapping[str, Any], parameters: Mapping[str, str]) -> JsonObject:
-        """The answer to a file with the profile by which it is read; raises as `post` does."""
+        """The answer to a POST of a file and the profile to read it by; raises as `post` does."""
         form = {"profile": json.dumps(profile)}
         return self._answer("POST", path, file=file, params=dict(parameters), data=form)
 
     def post_photograph(self, path: str, file: Path, media_type: str) -> JsonObject:
-        """The answer to a photograph's file; raises as `post` does."""
+        """The answer to a POST of a photograph; raises as `post` does."""
         return self._answer("POST", path, file=file, headers={"Content-Type": media_type})
 
     def file(self, path: str) -> bytes:
-        """The file that answers a GET; raises as `post` does."""
+        """The file returned by a GET; raises as `post` does."""
         return self._repeated("GET", path, image)
 
     def delete(self, path: str) -> JsonObject:
-        """The answer to a DELETE, empty where it says nothing; raises as `post` does."""
+        """The answer to a DELETE, empty if it has no body; raises as `post` does."""
         return self._repeated("DELETE", path, lambda response: {} if response.status_code == 204 else content(response))
 
     def get(self, path: str, **params: Any) -> JsonObject:
@@ -108,7 +109,7 @@ class Service:
         return self._answer("GET", path, params=params)
 
     def table(self, path: str, **params: Any) -> str:
-        """The CSV that answers a GET; raises as `post` does."""
+        """The CSV returned by a GET; raises as `post` does."""
         return self._repeated("GET", path, csv, params=params)
 
     def _answer(self, method: str, path: str, **request: Any) -> JsonObject:
@@ -169,7 +170,7 @@ def _body(content: Mapping[str, Any]) -> bytes:
 
 
 def _plain(value: Any) -> Any:
-    """A number or a time of numpy, pandas or the standard library, as JSON takes it."""
+    """A number or time of numpy, pandas or the standard library, converted for JSON."""
     for convert in ("tolist", "isoformat"):
         if hasattr(value, convert):
             return getattr(value, convert)()
@@ -177,7 +178,8 @@ def _plain(value: Any) -> Any:
 
 
 def connect(url: str, *, key: str | None = None, timeout: float = 60.0) -> "httpx2.Client":
-    """A client for the service at `url`, with a key where one is needed. Raises ValueError on an address that is none."""
+    """An HTTP client for the service at `url`, with a key if one is needed. Raises ValueError on an address that is
+    none."""
     import httpx2  # start-up time: a tenth of a second, which no command needs that asks no service
 
     headers = {} if key is None else {"Authorization": f"Bearer {key}"}

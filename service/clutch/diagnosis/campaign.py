@@ -24,7 +24,7 @@ Kind = TypeVar("Kind", StationaryRun, DynamicRun, DutyRun, MaintenanceEvent)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DiagnosedLife:
-    """The present life of a clutch, its runs in the order of its events, and notes on what was left out of them.
+    """The present life of a clutch, its runs in the order of its events, and notes on runs and records left out.
 
     `life` is None where there are no runs.
     """
@@ -36,7 +36,7 @@ class DiagnosedLife:
 
     @property
     def campaign(self) -> Campaign:
-        """All of it, as the diagnosis takes it."""
+        """The runs as the campaign that the diagnosis takes."""
         return campaign_of(self.record, self.runs)
 
 
@@ -60,10 +60,8 @@ def _runs_of_kind(kind: type[Kind], runs: Sequence[CampaignRun]) -> tuple[Kind, 
 
 
 def records_to_keep(run_ids: Sequence[str], samples: Mapping[str, int]) -> set[str]:
-    """The runs whose sampled records are kept: all, or every second, third ... where they would be too many.
-
-    `samples` is how many samples each sampled record has.
-    """
+    """The runs whose sampled records are kept: all, or every second, third, … if they have too many samples together.
+    `samples` is the number of samples of each sampled record."""
     sizes = [(run_id, samples[run_id]) for run_id in run_ids if run_id in samples]
     fitting = [(run_id, size) for run_id, size in sizes if size <= MAX_OF_RECORD]
     every = max(1, math.ceil(sum(size for _, size in fitting) / MAX_OF_CAMPAIGN))
@@ -88,7 +86,8 @@ def run_of(run: IncomingRun, *, origin: float, torque_filter: float = 0.0, keep_
 
 
 def without_record(run: IncomingRun, *, origin: float) -> CampaignRun:
-    """A run whose sampled record is not read: one point of 1 bar, 1 rad/s and 1 Nm stands in for what it measured."""
+    """A run with its sampled record left unread: one point of 1 bar, 1 rad/s and 1 Nm takes the place of its
+    measurements."""
     point = np.ones(1)
     if run.kind == STATIONARY:
         return StationaryRun(**head_of(run, origin), plateaus=Plateaus(pressure=1e5 * point, speed=point, torque=point))
@@ -99,20 +98,20 @@ def without_record(run: IncomingRun, *, origin: float) -> CampaignRun:
 
 
 class Moment(TypedDict):
-    """When something was: cycles from the life's origin, and when it was started [s since 1970], None where not said."""
+    """The time of a run: cycles since the life's origin, and its start [s since 1970], None if not stated."""
 
     cycles: float
     moment: float | None
 
 
 class TestHead(Moment):
-    """What every test has."""
+    """The fields of every test: its name and its time."""
 
     run_id: str
 
 
 def head_of(run: IncomingRun, origin: float) -> TestHead:
-    """Name and moment of a test, its cycles counted from `origin`."""
+    """A test's name and time, with its cycles counted from `origin`."""
     return {"run_id": run.run_id, **_when(run, origin)}
 
 
@@ -135,7 +134,7 @@ def _stationary(run: IncomingRun, origin: float, torque_filter: float, keep_reco
 
 
 def thinned(record: Record, most: int = MAX_OF_RECORD) -> Record:
-    """The record, or the means of blocks of its samples where it has more than `most`."""
+    """The record, or block means of its samples if it has more than `most`."""
     size = math.ceil(record.time.size / most)
     if size == 1:
         return record

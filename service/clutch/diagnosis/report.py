@@ -31,7 +31,7 @@ _GAIN = {"reduction_percent_sd": "reduction_sd", "prediction_log_score_gain": "f
 
 
 def finite(value: float) -> float | None:
-    """The number where it is one that JSON can carry, else None."""
+    """The number if JSON can represent it, else None."""
     number = float(value)
     return number if math.isfinite(number) else None
 
@@ -59,7 +59,7 @@ def _gain(gain: Gain | None, before: LifePrediction | None, after: LifePredictio
 
 
 def _stored(prediction: LifePrediction | None) -> dict[str, object]:
-    """A prediction as JSON columns keep it; nothing without one."""
+    """A prediction as the value of a JSON column; empty without one."""
     return {} if prediction is None else prediction.model_dump(mode="json", exclude_unset=True)
 
 
@@ -90,7 +90,7 @@ def public(
     after: LifePrediction | None,
     notes: tuple[str, ...],
 ) -> shapes.ReportOut:
-    """The report as it is answered; its cycles counted from `origin` become cycles since new.
+    """The report as sent to clients, with its cycles from `origin` converted to cycles since new.
 
     `before` and `after` are the remaining useful life under the baseline and under the extension.
     """
@@ -146,7 +146,7 @@ def _isolability(isolability: Isolability) -> shapes.IsolabilityOut:
 
 
 def _shaped(shape: type[Shape], found: object, **others: Any) -> Shape:
-    """An answer with the fields of what was found; the others in their places."""
+    """An answer of this type with the fields of the same names of `found`, or those given in `others`."""
     fields = shape.model_fields
     return shape(**{name: others[name] if name in others else _plain(getattr(found, name)) for name in fields})
 
@@ -160,7 +160,8 @@ def _plain(value: Any) -> Any:
 
 
 def _remaining(report: Report, before: LifePrediction | None, after: LifePrediction | None) -> str:
-    """What adopting the extension would do to the median of the remaining life, in a sentence; nothing without one.
+    """The effect of adopting the extension on the median of the remaining life, in a sentence; empty without an
+    extension.
 
     Two digits: a filter's draws move the third, and with them the clutch's name."""
     medians = [None if prediction is None else prediction.remaining_cycles.get("0.5") for prediction in (before, after)]

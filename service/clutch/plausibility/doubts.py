@@ -42,7 +42,7 @@ UNIT = "unit"
 
 
 def doubt(verdict: SlipVerdict, sent: RunReading, shown: Shown) -> Notice:
-    """The doubt of which the verdict's slip is the most probable explanation."""
+    """The doubt about a run whose most probable explanation is the verdict's slip."""
     slip = verdict.slip
     if slip.name in OF_CYCLES:
         return _cycles_notice(verdict, sent)
@@ -58,7 +58,7 @@ def doubt(verdict: SlipVerdict, sent: RunReading, shown: Shown) -> Notice:
 
 
 def negative(cof: float) -> Notice:
-    """The doubt of a torque that pushes."""
+    """The doubt about a run with negative friction: its torque pushes instead of braking."""
     message = (
         f"torque drives the clutch instead of braking it (COF {cof:.3g}): is the sign of torque or speed wrong? "
         "Send the run with the right sign, or confirm it."
@@ -67,8 +67,8 @@ def negative(cof: float) -> Notice:
 
 
 def common_doubts(cause: CommonCause, events: Sequence[Event]) -> dict[str, tuple[Notice, ...]]:
-    """The one doubt of all runs of a cause, by run_id, with the cycles that each was made at; `events` are all runs. The
-    question stays as it is while further runs join."""
+    """One common doubt for all runs with the same cause, by run_id, with the cycles of each run; `events` are all runs.
+    The question stays as it is while further runs join."""
     own = [events[index] for index in cause.runs]
     moment = datetime.fromtimestamp(own[0].moment, UTC)
     day, since = f"{moment.day} {moment:%b %Y}", f"the runs since {own[0].run_id}"
@@ -147,7 +147,8 @@ def _unit_notice(verdict: SlipVerdict, shown: Shown) -> Notice:
 
 
 def _expected_then(verdict: SlipVerdict) -> bool:
-    """Whether COF without the slip is as expected: else no unit is asked for, though it explains a part."""
+    """Whether COF without the slip would be as expected; if not, the doubt does not ask for the unit, although a wrong
+    one explains part of the deviation."""
     likely = verdict.slip.likely
     if verdict.expected_then is None or likely.log_cof is None:
         return True
@@ -175,9 +176,8 @@ def _number(value: float) -> str:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Judged:
-    """What the joint judgement says: the doubts about each run that is to be held, by run_id; the runs that were held and
-    are now accepted, those that were accepted and are now held, and why, by run_id; whether a test begins a new level that
-    did not, or does not that did, by run_id."""
+    """The result of the joint judgement: doubts about each run to be held, by run_id; held runs now accepted, accepted
+    runs now held, and the reasons, by run_id; and changes of whether a test begins a new level, by run_id."""
 
     doubts: Mapping[str, tuple[Notice, ...]] = field(default_factory=dict)
     accepted: tuple[Event, ...] = ()
@@ -187,24 +187,24 @@ class Judged:
 
     @property
     def changes(self) -> bool:
-        """Whether anything changes of what was there already."""
+        """Whether the judgement changes the state or level of any earlier run."""
         return bool(self.accepted or self.held or self.levels)
 
     def settled(self, events: Sequence[Event], further: Sequence[Event] = ()) -> tuple[Event, ...]:
-        """The accepted runs as they are from now on: `events` were accepted before, `further` come in accepted."""
+        """The accepted runs after the judgement; `events` were accepted before, `further` are newly accepted."""
         gone = {event.run_id for event in self.held}
         settled = order([*(event for event in events if event.run_id not in gone), *self.accepted, *further])
         return tuple(replace(event, new_level=self.levels.get(event.run_id, event.new_level)) for event in settled)
 
     def aside(self, held: Sequence[Event], further: Sequence[Event]) -> tuple[Event, ...]:
-        """The held runs as they are from now on: `held` were before, `further` come in held."""
+        """The held runs after the judgement; `held` were held before, `further` are newly held."""
         back = {event.run_id for event in self.accepted}
         return order([*(event for event in held if event.run_id not in back), *self.held, *further])
 
 
 def doubts_alone(run: IncomingRun, analysis: Analysis, geometry: Geometry) -> tuple[Shown | None, tuple[Notice, ...]]:
-    """What the rows of a run show, and what is odd about them whatever other runs show; None and why where a channel is
-    dead."""
+    """The friction that a run's rows show, and the doubts about them that need no other run; if a channel is dead, None
+    and the reason."""
     columns = columns_of(run, analysis)
     odd = [] if columns is None else dead_channels(run.kind, columns, geometry)
     if odd:
@@ -224,11 +224,11 @@ def doubts_together(
     corrected: bool,
     changed: Sequence[Event] = (),
 ) -> Judged:
-    """Which runs are to be held, all of them weighed together.
+    """The joint judgement on all runs of a clutch: which are to be held and which accepted.
 
-    `accepted` and `held` are the runs as they stand, `incoming` one that comes in or was changed (None: none is new),
-    `changed` those that were changed or taken out: what lies about them is looked at. `corrected`: a model in force
-    corrects the mean COFs of tests.
+    `accepted` and `held` are the runs in their present states, `incoming` a new or changed run (None: none), `changed`
+    the runs changed or removed, whose neighbours are judged again. `corrected`: a model in force corrects the mean COFs
+    of tests.
     """
     new = [] if incoming is None else [incoming]
     doubted = _doubted(accepted, held, new)
@@ -266,7 +266,8 @@ def doubts_together(
 def levelled(
     accepted: Sequence[Event], held: Sequence[Event], geometry: Geometry, *, corrected: bool
 ) -> tuple[Event, ...]:
-    """The accepted runs with the new levels that they show; arguments as of `doubts_together`, which says the same."""
+    """The accepted runs with the new levels that they show; arguments as in `doubts_together`, which finds the same
+    levels."""
     doubted = _doubted(accepted, held)
     events = order([*accepted, *doubted])
     names = {event.run_id for event in doubted}
@@ -276,7 +277,7 @@ def levelled(
 
 
 def _doubted(accepted: Sequence[Event], held: Sequence[Event], new: Sequence[Event] = ()) -> list[Event]:
-    """The held runs that are part of the question: without a dead channel, and not after the declared end of their life."""
+    """The held runs to be judged again: those without a dead channel, and not after the declared end of their life."""
     return [
         event
         for event in held
@@ -285,7 +286,7 @@ def _doubted(accepted: Sequence[Event], held: Sequence[Event], new: Sequence[Eve
 
 
 def _levels(events: Sequence[Event], judgement: JointJudgement) -> dict[str, bool]:
-    """Whether a test begins a new level that did not, or does not that did, by run_id."""
+    """Changes of whether a test begins a new level, by run_id."""
     return {
         events[index].run_id: index in judgement.levels
         for index in judgement.tests
@@ -294,7 +295,7 @@ def _levels(events: Sequence[Event], judgement: JointJudgement) -> dict[str, boo
 
 
 def _names_of_nearest_runs(event: Event, counted: Sequence[Event]) -> str:
-    """The runs nearest to one in the history, of its kind where there are any, by their names."""
+    """The names of the runs nearest to one in the history, of its kind if there are any."""
     other_runs = [other for other in counted if other.run_id != event.run_id]
     alike = [other for other in other_runs if other.kind == event.kind] or other_runs
     nearest = sorted(alike, key=lambda other: (abs(other.cycles - event.cycles), other.run_id))[:3]

@@ -117,7 +117,7 @@ def columns_of(run: IncomingRun, analysis: Analysis) -> Columns | None:
 
 
 def shown_by(columns: Columns | None, geometry: Geometry) -> Shown:
-    """What the rows of a run show."""
+    """Friction, pressure, speed and oil temperature shown by the rows of a run."""
     if columns is None:
         return Shown()
     oil = None if columns.oil_temperature is None else float(np.median(columns.oil_temperature))
@@ -136,7 +136,7 @@ def shown_by(columns: Columns | None, geometry: Geometry) -> Shown:
 
 @dataclass(frozen=True, kw_only=True)
 class _Comparison:
-    """What the runs of a life are compared with: all its tests, and of these the first at the pressures that are usual."""
+    """The basis of comparison for the runs of a life: all its tests, and the first of them at the usual pressures."""
 
     life: Life
     geometry: Geometry
@@ -149,7 +149,7 @@ class _Comparison:
 
     @cached_property
     def reference(self) -> Event | None:
-        """The test with whose pressures COFs are compared."""
+        """The test whose pressures are the basis for comparing COFs."""
         if not self.tests:
             return None
         usual = median_low([max(event.cofs) for event in self.tests])
@@ -162,20 +162,20 @@ class _Comparison:
         return median_low(logged) if logged else None
 
     def in_other_oil(self, event: Event) -> bool:
-        """Whether a test was made at another oil temperature than is usual: its COF is none of the course."""
+        """Whether a test's oil temperature is unusual, so that its COF does not belong to the course of COF."""
         if self.oil is None or event.oil_temperature is None:
             return False
         return abs(event.oil_temperature - self.oil) > OTHER_OIL
 
     def shows_course(self, event: Event) -> bool:
-        """Whether the COF of a run is one of the course: of a test in the usual oil, and positive."""
+        """Whether a run's COF belongs to the course of COF: positive, and of a test in the usual oil."""
         if not event.cofs or self.in_other_oil(event):
             return False
         positive = min(event.cofs.values())[0] > 0.0  # then it is, whatever the pressures are
         return positive or self._compared(event, event.shown or Shown(), event.cofs) is not None
 
     def reading(self, event: Event, shown: Shown, cofs: Mapping[float, tuple[float, float]] | None) -> RunReading:
-        """The reading of a run that shows this."""
+        """The reading of a run with this shown friction."""
         log_cof, spread = self._compared(event, shown, cofs) or (None, 0.0)
         protocol = self._log_protocol(event, shown)
         return RunReading(cycles=event.cycles, log_cof=log_cof, spread=spread, log_protocol=protocol)
@@ -183,7 +183,7 @@ class _Comparison:
     def _compared(
         self, event: Event, shown: Shown, mean_cof: Mapping[float, tuple[float, float]] | None
     ) -> tuple[float, float] | None:
-        """log COF of a run as the tests of its life show it, and its deviation; None where it shows none."""
+        """log COF of a run on the scale of its life's tests, and its standard deviation; None if it shows no COF."""
         run_sd = {STATIONARY: 0.0, DYNAMIC: DYNAMIC_SD}.get(event.kind, ENGAGEMENT_SD)
         spread = math.hypot(run_sd, odds.STEP_SD if self.corrected else 0.0)
         first = self.reference
@@ -206,7 +206,7 @@ class _Comparison:
 
     @cached_property
     def usual(self) -> tuple["_Usual", "_Usual", "_Usual"]:
-        """What log pressure, log speed and oil temperature of tests are in this life."""
+        """The distributions of log pressure, log speed and oil temperature of this life's tests."""
         shown = [event.shown for event in self.tests if event.shown is not None]
         return (
             _PRESSURE.with_tests(math.log(one.pressure) for one in shown if one.pressure),
@@ -215,7 +215,8 @@ class _Comparison:
         )
 
     def _log_protocol(self, event: Event, shown: Shown) -> float:
-        """log density of pressures, speeds and oil temperature: those of another test of the life, or others."""
+        """The log density of a run's pressure, speed and oil temperature: equal to another test's of the life, or
+        different."""
         is_test = event.kind in (STATIONARY, DYNAMIC)
         measured = event.shown if event.cofs and event.shown is not None else Shown()
         declared = None if event.duty is None else event.duty.speed
@@ -236,12 +237,12 @@ class _Comparison:
         return total
 
     def _pressed(self, shown: Shown) -> float:
-        """log COF of the torque of an open clutch if it were pressed as in the reference test."""
+        """log COF that an open clutch's torque would mean if the clutch were pressed as in the reference test."""
         levels = [PRESSURE] if self.reference is None else list(self.reference.cofs)
         return math.log((shown.open_torque or 0.0) / self.geometry.torque_per_cof(sum(levels) / len(levels)))
 
     def slips(self, event: Event, shown: Shown) -> Iterator[Slip]:
-        """The slips of a run's channels: another unit, a pressure that is dead."""
+        """The possible slips of a run's channels: a wrong unit, or a dead pressure channel."""
         share = math.log(odds.OTHER_UNIT / len(UNITS))
         if shown.cof is not None:
             for channel, unit, factor in UNITS:
@@ -277,7 +278,7 @@ UNITS = (
 
 
 def runs_of(events: Sequence[Event], geometry: Geometry, *, corrected: bool) -> list[Run]:
-    """All runs of a clutch in the order of their history, held or not.
+    """All runs of a clutch in the order of their history, both accepted and held.
 
     `corrected`: a model in force corrects the mean COFs of tests.
     """
@@ -308,7 +309,7 @@ RUN_IN = "run_in"
 
 
 def _in_unit(shown: Shown, channel: str, factor: float) -> Shown:
-    """What a run would show if a channel were so many times too large."""
+    """A run's shown friction after a channel is divided by `factor`."""
     if channel == "speed":
         return replace(shown, speed=None if shown.speed is None else shown.speed / factor)
     if channel == "torque":
@@ -329,8 +330,8 @@ def _scaled(
 
 @dataclass(frozen=True, slots=True)
 class _Usual:
-    """What is known of a number before any test, mean and deviation; the deviation of numbers that are the same; and how
-    many tests have which, in tenths of that."""
+    """The distribution of a number among tests: prior mean and standard deviation, the standard deviation of repeated
+    values, and the counts of tests by value, in tenths of that."""
 
     mean: float
     deviation: float
@@ -338,7 +339,7 @@ class _Usual:
     tests: Mapping[int, int] = field(default_factory=dict)
 
     def with_tests(self, values: Iterable[float]) -> "_Usual":
-        """This prior knowledge, updated with the values of tests."""
+        """This distribution, updated with the values of tests."""
         places, first, count = np.unique(
             np.rint(10.0 * np.array(list(values)) / self.same), return_index=True, return_counts=True
         )
@@ -351,7 +352,8 @@ class _Usual:
         return round(10.0 * value / self.same)
 
     def log_of(self, value: float, own: float | None) -> float:
-        """log density of a value: that of a test again, but for its `own` one (None: it has none), or any."""
+        """The log density of a value: equal to that of another test (other than its `own` one; None: it has none), or
+        different."""
         anywhere = _log_normal(value, self.mean, self.deviation)
         place = None if own is None else self._place(own)
         other_counts = {at: count - (at == place) for at, count in self.tests.items()}
@@ -377,7 +379,7 @@ DEAD = "dead_channel"
 
 
 def dead_channels(kind: str, columns: Columns, geometry: Geometry) -> list[Notice]:
-    """What is odd about the channels of a run."""
+    """Doubts about a run with channels that show no plausible signal."""
     return [Notice(code=DEAD, message=message) for message in _oddities(kind, columns, geometry)]
 
 
@@ -409,7 +411,8 @@ def _oddities(kind: str, columns: Columns, geometry: Geometry) -> Iterator[str]:
 
 
 def _at_the_limit(rows: Columns) -> Iterator[str]:
-    """Torque that stays at its highest value at several speeds: no noise, no curve."""
+    """The sentence on torque that stays at its highest value at several speeds, so that it shows neither noise nor a
+    curve."""
     size = np.abs(rows.torque)
     highest = float(size.max())
     at_limit = size >= (1.0 - SAME_TORQUE) * highest
@@ -428,7 +431,7 @@ def _at_the_limit(rows: Columns) -> Iterator[str]:
 
 
 def _not_following(rows: Columns, geometry: Geometry) -> Iterator[str]:
-    """Torque that does not go with pressure, or scatters at one pressure as if that had varied."""
+    """The sentence on torque that does not follow pressure, or scatters at one pressure as if that had varied."""
     low, high = np.quantile(rows.pressure, [0.02, 0.98]).tolist()
     span = f"{low / PASCALS_PER_BAR:.3g} to {high / PASCALS_PER_BAR:.3g} bar"
     if high > PRESSURE_SPAN * low:

@@ -42,9 +42,9 @@ Sample = tuple[FloatArray, FloatArray]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CriterionEnd:
-    """When a quantity reaches its limit: `ends` in cycles since new (inf: not by the horizon) with their weights; `current`
-    is mean and deviation of the quantity now, `initial` its mean when new. With too few tests `current` is the last of them
-    as it was measured, and the others are None."""
+    """The end of life by one criterion: `ends` in cycles since new (inf: not by the horizon) with their weights;
+    `current` is mean and standard deviation of the quantity now, `initial` its mean when new. With too few tests
+    `current` is the last measured value, and the others are None."""
 
     criterion: CriterionIn
     tests: int
@@ -54,9 +54,10 @@ class CriterionEnd:
 
 
 def criterion_end(measured: MeasuredLife, criterion: CriterionIn, method: str) -> CriterionEnd:
-    """The end of a life by a criterion; a share of mean COF by a filter, all else by the exact posterior on a lattice.
+    """The end of life by a criterion; a share of mean COF by a filter, other criteria by the exact posterior on a
+    lattice.
 
-    Raises NotFoundError where the quantity is not measured there.
+    Raises NotFoundError if the quantity is not measured at the criterion's place.
     """
     quantity = quantity_named(criterion.quantity)
     series = _series_at(measured, quantity, criterion)
@@ -90,7 +91,7 @@ def criterion_end(measured: MeasuredLife, criterion: CriterionIn, method: str) -
 
 
 def _series_at(measured: MeasuredLife, quantity: Quantity, criterion: CriterionIn) -> Series | None:
-    """The series of the criterion's quantity at its pressure, speed and frequency; None where it was not measured yet."""
+    """The series of the criterion's quantity at its pressure, speed and frequency; None if not measured yet."""
     speeds = () if criterion.speed_rpm is None else (criterion.speed_rpm,)
     frequency = None if criterion.frequency_hz is None else rounded_frequency(criterion.frequency_hz)
     tracks = [
@@ -116,7 +117,7 @@ def _series_at(measured: MeasuredLife, quantity: Quantity, criterion: CriterionI
 def _mean_cof(
     measured: MeasuredLife, series: Series, fraction: float, method: str, at: FloatArray, horizon: float
 ) -> tuple[Sample, Sample]:
-    """The end by a share of mean COF as `/remaining-useful-life` states it, and mean COF [2, n] at progress `at` [2]."""
+    """The end by a share of mean COF as in `/remaining-useful-life`, and mean COF [2, n] at progress `at` [2]."""
     tracked = advance(method, series, measured.filters.get(carrier(method)), len(series.measurements))
     sample = drawn(method, series, tracked)
     end = end_of_life(sample, series, tracked, measured.life.events[-1].cycles, fraction, horizon)
@@ -145,8 +146,8 @@ GIVEN = ("quantity", "pressure_bar", "speed_rpm", "frequency_hz", "fraction", "b
 def criteria_answer(
     measured: MeasuredLife, ends: Sequence[CriterionEnd], prediction: LifePrediction
 ) -> tuple[LifePrediction, list[CriterionOutcome]]:
-    """A prediction by mean COF as it is by several limits, of which the first that is reached ends the life: its present
-    health is the least by any; and what is known of each."""
+    """A prediction by several limits, of which the first reached ends the life: its present health is the lowest of
+    all; and the state by each limit."""
     now = measured.life.events[-1].cycles
     samples = [end.ends for end in ends if end.ends is not None]
     if not samples:
@@ -194,7 +195,7 @@ def _health(end: CriterionEnd) -> float | None:
 
 
 def _quantiles(sample: Sample | None, now: float) -> dict[str, Quantiles]:
-    """Quantiles of the end and of what remains from `now` cycles; null beyond the horizon."""
+    """Quantiles of the end of life and of the remaining cycles from `now`; null beyond the horizon."""
     if sample is None:
         return {"end_of_life_cycles": by_quantile({}), "remaining_cycles": by_quantile({})}
     ends, weight = sample
@@ -206,7 +207,7 @@ def _quantiles(sample: Sample | None, now: float) -> dict[str, Quantiles]:
 
 
 def _item(end: CriterionEnd, now: float, first: float) -> CriterionOutcome:
-    """One criterion, with its own end, and how probably it is the first."""
+    """One criterion with its own end, and the probability that it is reached first."""
     value, sd = end.current or (None, None)
     quantiles = _quantiles(end.ends, now)
     return CriterionOutcome(
@@ -221,7 +222,7 @@ def _item(end: CriterionEnd, now: float, first: float) -> CriterionOutcome:
 
 
 def _place(end: CriterionEnd) -> Mapping[str, Any]:
-    """A criterion as the record has it, with its quantity when new and its limit."""
+    """A criterion of the record, with its quantity when new and its limit."""
     return {name: getattr(end.criterion, name) for name in GIVEN} | {"initial": end.initial, "limit": _limit(end)}
 
 
@@ -234,7 +235,7 @@ def _limit(end: CriterionEnd) -> float | None:
 
 
 def _criterion(end: CriterionEnd) -> Criterion:
-    """The leading criterion as the answer's own; mean COF's numbers only where it is mean COF."""
+    """The leading criterion as the answer's `criterion`; with mean COF's numbers only if it is mean COF."""
     of_cof = end.criterion.quantity == MEAN_COF
     return Criterion(
         **_place(end),

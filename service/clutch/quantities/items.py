@@ -26,7 +26,7 @@ _POINTS, _AHEAD = 40, 1.5
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _OfEq6:
-    """What an item says of eq. 6; nothing where the quantity has no track of its own."""
+    """The fields of an item about eq. 6; empty if the quantity has no track of its own."""
 
     coefficients: Coefficients | None = None
     correlations: list[list[float]] | None = None
@@ -35,7 +35,7 @@ class _OfEq6:
 
 
 def trajectory_cycles(series: Series, until: float | None) -> FloatArray:
-    """The cycles since new [k] at which a trajectory is shown, up to `until` where that is asked for."""
+    """The cycles since new [k] at which a trajectory is shown, up to `until` if that is given."""
     origin, last = series.scale.origin, float(series.scale.cycles(series.measurements[-1].progress))
     length = max(1.0, last - origin) * _AHEAD if until is None else max(1.0, until - origin)
     return origin + np.linspace(0.0, length, _POINTS)
@@ -44,8 +44,8 @@ def trajectory_cycles(series: Series, until: float | None) -> FloatArray:
 def track_item(
     quantity: Quantity, series: Series, posterior: TrackPosterior, draws: int = 0, until: float | None = None
 ) -> DegradationItem:
-    """A quantity that has a track of its own; the course of the model in force is put back on. `draws` > 0: with so many
-    joint draws of the coefficients. With too few tests there is only what was measured."""
+    """A quantity with a track of its own; the course of the model in force is added back. `draws` > 0: with as many
+    joint draws of the coefficients. With too few tests it has only the measured values."""
     if len({measurement.progress for measurement in series.measurements}) < FEWEST_TESTS:
         return paths_item(quantity, series, None)
     cycles = trajectory_cycles(series, until)
@@ -70,8 +70,8 @@ def track_item(
 def paths_item(
     quantity: Quantity, series: Series, paths: FloatArray | None, until: float | None = None
 ) -> DegradationItem:
-    """A quantity that follows from others' tracks, whose `paths` [k, n] over `trajectory_cycles` are equal draws (None: too
-    few tests): it has no coefficients of its own."""
+    """A quantity computed from others' tracks, with `paths` [k, n] over `trajectory_cycles` as equal draws (None: too
+    few tests); it has no coefficients of its own."""
     band = np.zeros((0, len(BAND))) if paths is None else np.quantile(paths, BAND, axis=1).T
     cycles = trajectory_cycles(series, until)[: band.shape[0]]
     return _item(quantity, series, _OfEq6(), cycles, band)
@@ -100,12 +100,12 @@ def _item(quantity: Quantity, series: Series, of_eq_6: _OfEq6, cycles: FloatArra
 
 
 def _samples(draws: TrackPosterior) -> Sequence[FloatArray]:
-    """The coefficients [n] in the order of COEFFICIENTS."""
+    """The samples of each coefficient [n], in the order of COEFFICIENTS."""
     return draws.initial, draws.change, draws.scale, draws.exponent
 
 
 def _named(each: Iterable[Own]) -> dict[str, Own]:
-    """What is given for each coefficient by its name."""
+    """The values, one for each coefficient, by coefficient name."""
     return dict(zip(COEFFICIENTS, each, strict=True))
 
 
@@ -122,7 +122,7 @@ def _estimate(draws: TrackPosterior, sample: FloatArray) -> Estimate:
 
 
 def _correlations(draws: TrackPosterior) -> list[list[float]]:
-    """The correlations of ξ0, Δ, log φ and log ε, [4][4]; none with what has no spread."""
+    """The correlations of ξ0, Δ, log φ and log ε, [4][4]; 0 for a coefficient without spread."""
     table = np.stack([draws.initial, draws.change, np.log(draws.scale), np.log(draws.exponent)])
     off = table - (table @ draws.weight)[:, None]
     covariance = (off * draws.weight) @ off.T

@@ -34,7 +34,7 @@ from service.errors import InvalidError, NotFoundError
 
 
 class Family(StrEnum):
-    """What a quantity comes from: mean COF, a fitted parameter, a curve's slope, a friction loop, an engagement."""
+    """The source of a quantity: mean COF, a fitted parameter, a curve's slope, a friction loop, or an engagement."""
 
     MEAN_COF = "mean_cof"
     PARAMETER = "parameter"
@@ -45,7 +45,7 @@ class Family(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Quantity:
-    """A quantity by its public name, the name that series of it have, its unit and its family."""
+    """A measured quantity: its public name, the name of its series, its unit and its family."""
 
     name: str
     internal: str
@@ -79,7 +79,7 @@ _BY_INTERNAL = {quantity.internal: quantity for quantity in QUANTITIES.values()}
 
 
 def quantity_named(name: str) -> Quantity:
-    """The quantity of a public name, of another name that criteria may have, or of a parameter's name without its unit.
+    """The quantity with this public name, alternative name in criteria, or parameter name without unit.
 
     Raises InvalidError for any other.
     """
@@ -91,17 +91,18 @@ def quantity_named(name: str) -> Quantity:
 
 
 def place_of(series: Series) -> dict[str, float | None]:
-    """Where a series was measured, as answers show it; null: over all pressures, or at no speed or frequency of its own."""
+    """The place of a series' measurements in an answer; null: over all pressures, or at no particular speed or
+    frequency."""
     pressure = None if series.pressure == ALL_PRESSURES else bar(series.pressure)
     return {"pressure_bar": pressure, "speed_rpm": series.speed_rpm, "frequency_hz": series.frequency_hz}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ChosenLife:
-    """A life (None: there was none yet), what it is tracked under, its number from 1 on and how many lives there are.
+    """A life (None: there was none yet), the assumptions for tracking it, its number from 1 on and the number of lives.
 
-    `held`: the runs that an answer about it is without: all that are held, where it is about the present, else those of
-    this life by then.
+    `held`: the held runs that an answer about it leaves out: all, if it is about the present, else those of this life
+    by then.
     """
 
     life: Life | None
@@ -111,7 +112,7 @@ class ChosenLife:
     held: tuple[Event, ...]
 
     def item(self) -> LifeNumber:
-        """The life as an answer names it."""
+        """The life's description in an answer."""
         return LifeNumber(
             number=self.number,
             of=self.of,
@@ -121,9 +122,9 @@ class ChosenLife:
 
 
 def chosen_life(state: ClutchHistory, number: int | None = None, at_cycles: float | None = None) -> ChosenLife:
-    """Life `number` of a clutch (None: the one that lasts at `at_cycles`, or at present), up to `at_cycles`.
+    """Life `number` of a clutch (None: the one at `at_cycles`, or the present one), up to `at_cycles`.
 
-    Each life is tracked under what was adopted for it. Raises NotFoundError where there is no such life.
+    Each life is tracked under the model adopted for it. Raises NotFoundError if there is no such life.
     """
     lives = state.lives
     if number is not None and not 1 <= number <= len(lives):
@@ -142,7 +143,7 @@ def chosen_life(state: ClutchHistory, number: int | None = None, at_cycles: floa
 
 
 def _held_runs_of_life(state: ClutchHistory, number: int, at_cycles: float | None) -> tuple[Event, ...]:
-    """The held runs that an answer about life `number` at `at_cycles` (None: whenever) is without."""
+    """The held runs that an answer about life `number` at `at_cycles` (None: any) leaves out."""
     lives = state.lives
     now = at_cycles is None or not state.events or at_cycles >= state.events[-1].cycles
     if now and number >= len(lives):
@@ -164,8 +165,8 @@ _GRID = Grid(nodes=_NODES, rows=_ROWS, levels=_LEVELS)
 
 
 def posterior_of(series: Series, method: str = _GRID.name) -> TrackPosterior:
-    """A weighted sample of a series' eq. 6, the same each time; by the exact filter on a lattice fit for plots, else by the
-    filter of that name taken through all measurements."""
+    """A weighted, reproducible sample of a series' eq. 6: by the exact filter on a lattice fit for plots, or by the
+    named filter after all measurements."""
     if method != _GRID.name:
         runs = len(series.measurements)
         return drawn(method, series, advance(method, series, None, runs, back_cast=BackCast.nothing()))
@@ -181,14 +182,14 @@ def posterior_of(series: Series, method: str = _GRID.name) -> TrackPosterior:
 
 
 def tests_of(life: Life, fits: Mapping[str, Sequence[LevelFit]]) -> list[Sequence[LevelFit]]:
-    """The levels of each of a life's events, none where it is no test."""
+    """The fitted levels of each of a life's events; empty if the event is no test."""
     return [fits.get(event.run_id, ()) for event in life.events]
 
 
 def parameter_series(
     life: Life, assumptions: Assumptions, tests: Sequence[Sequence[LevelFit]], name: str
 ) -> list[Series]:
-    """One Stribeck parameter at every reference pressure, by the fits that determine it."""
+    """The series of one Stribeck parameter at every reference pressure, from the fits that determine it."""
     column = PARAMETER_NAMES.index(name)
     values = [
         {
@@ -211,7 +212,8 @@ def parameter_tracks(
     method: str = _GRID.name,
     pressures: Collection[float] | None = None,
 ) -> dict[tuple[str, float], Track]:
-    """The eq. 6 of Stribeck parameters at every reference pressure where they are known, by name and pressure [Pa]."""
+    """Tracks (eq. 6) of the Stribeck parameters at the reference pressures where they are known, by name and pressure
+    [Pa]."""
     return {
         (name, series.pressure): (series, posterior_of(series, method))
         for name in PARAMETER_NAMES
@@ -268,13 +270,13 @@ class MeasuredLife:
 
     @cached_property
     def determined(self) -> list[dict[float, StribeckFit]]:
-        """Of each event the fits that determine all four parameters, by pressure [Pa]."""
+        """The fits that determine all four parameters, by pressure [Pa], for each event."""
         return [
             {level.fit.pressure: level.fit for level in levels if not level.fit.undetermined} for levels in self.tests
         ]
 
     def series(self, quantity: Quantity, speeds: Sequence[float] = SLOPE_SPEEDS) -> list[Series]:
-        """The series of a quantity wherever it was measured; of a slope at `speeds` [rpm]."""
+        """The series of a quantity at each place where it was measured; a slope's at `speeds` [rpm]."""
         match quantity.family:
             case Family.MEAN_COF:
                 tracks = [self.life.pooled(self.assumptions), *self.mean_cofs().values()]
@@ -328,18 +330,19 @@ class MeasuredLife:
 
 
 def curves_of(levels: Sequence[LevelFit]) -> list[LevelFit]:
-    """The levels of a test that were measured at enough speeds for a curve."""
+    """The levels of a test with enough speeds for a curve."""
     return [fitted for fitted in levels if fitted.speeds >= FEWEST_SPEEDS]
 
 
 def slope_of(curve: LevelFit, geometry: Geometry, speed_rpm: float) -> Value | None:
-    """dμ/dv of a fitted curve at a speed > 0 and its standard error [s/m]; None of a curve without friction."""
+    """dμ/dv of a fitted curve at a speed > 0, with its standard error [s/m]; None for a curve without friction."""
     velocity = float(geometry.sliding_velocity(np.array(speed_rpm * RADIANS_PER_SECOND_PER_RPM)))
     return cof_slope(curve.fit, velocity, geometry.torque_per_cof(curve.mean_pressure))
 
 
 def _values(loops: Sequence[Loop], columns: tuple[str, str], frequency: float) -> dict[float, Value]:
-    """A quantity of the loops of one frequency by pressure [Pa], the last of a pressure's; where it is determined."""
+    """A quantity of the loops at one frequency, by pressure [Pa]; of several loops at a pressure, the last that
+    determines it."""
     name, deviation = columns
     return {
         loop.pressure_bar * PASCALS_PER_BAR: (value, sd)

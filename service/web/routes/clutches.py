@@ -92,7 +92,7 @@ async def totals(request: Request, context: auth.OwnReader, archived: Archived =
 async def _answer_about_all_clutches(
     request: Request, context: Context, key: Hashable, make: Callable[[], bytes]
 ) -> Response:
-    """A GET's answer that any commit may change, made once for what is committed."""
+    """The response to a GET about all clutches, cached until the database's next commit."""
     # the version before the rows are read: what is committed meanwhile makes another
     answer = await responses.cached_answer(context, key, auth.snapshot_of(request).version, make)
     if auth.grant_of(request).clutches is None:

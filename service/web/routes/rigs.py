@@ -67,7 +67,7 @@ async def put_rig(request: Request, context: Admin, name: parameters.RigName) ->
 
 
 async def _saved(request: Request, context: Context, name: str | None) -> Response:
-    """Save the profile of the body, in the place of that of the name in the path."""
+    """Save the body's profile, or replace the one named in the path with it."""
     rig = await sent(request, RigIn)
     require_usable(rig)
     if name not in (None, rig.name):

@@ -141,7 +141,8 @@ async def read_run_file(of: responses.Of, run_id: parameters.RunId) -> Response:
 async def _copy(
     request: Request, context: Context, tag: str, write: Callable[..., object], clutch_id: str, run_id: str
 ) -> files.Copy:
-    """What `write` writes of a run; a caller's copies take turns, so that others' long records need not wait for them."""
+    """A copy of a run, written by `write`. The copies of one caller are made one after the other, so that other callers
+    need not wait for its long records."""
 
     def make(path: Path) -> "Future[object]":
         turn = f"copies for {grant_of(request).name}"
@@ -324,7 +325,7 @@ async def _changed(
     sent: Correction | Corrections | Withdrawal | Withdrawals | Confirmation | Confirmations,
     **more: Any,
 ) -> Response:
-    """The receipt after a change, or a list of them where it is of a list of runs."""
+    """The receipt after a change; a list of receipts if a list of runs was changed."""
     by, reason, at = grant_of(of.request).name, sent.reason, responses.now()
     edit = partial(change_run.change, action=action, reason=reason, by=by, at=at, **more)
     if isinstance(run_id, str):

@@ -45,7 +45,7 @@ _UNAVAILABLE = ("08", "28", "3D", "53", "57", "58", "XX")
 
 
 def translated(name: str) -> AbstractContextManager[None]:
-    """Raise the store's own errors, naming the database, for what driver and pool raise inside."""
+    """Context that raises errors of driver and pool as the storage's own, which name the database."""
     return translated_by(partial(_store_error, name), (PoolTimeoutError, DBAPIError))
 
 
@@ -88,12 +88,12 @@ SELECT set_config('lock_timeout', '{lock_timeout:d}', false),
 
 
 def is_on_server(url: str) -> bool:
-    """Whether an address is that of a database on a server, not of a file."""
+    """Whether an address is that of a database on a server."""
     return url.startswith(f"{SCHEME}://")
 
 
 def address_of(url: str) -> sa.URL:
-    """The address in its parts; ValueError, which says nothing of a password, where a part is missing or wrong."""
+    """The parsed address; ValueError, without the password, if a part is missing or wrong."""
     try:
         address = sa.make_url(url)
     except (ArgumentError, ValueError):
@@ -106,20 +106,20 @@ def address_of(url: str) -> sa.URL:
 
 
 def shown(address: sa.URL) -> str:
-    """The address as logs and errors may show it: without the password and the options, one of which may be a password."""
+    """The address for logs and errors: without the password and the options, one of which may be a password."""
     place = address.host or "local socket"
     return f"PostgreSQL database {address.database} ({place}{'' if address.port is None else f':{address.port}'})"
 
 
 def make_engine(address: sa.URL, lock_timeout: float) -> sa.Engine:
-    """An engine on the database. Raises StorageUnavailable where the driver is not installed."""
+    """An engine for the database. Raises StorageUnavailable if the driver is not installed."""
     # a server that was started again has ended the connections that were kept
     return _engine(address, lock_timeout, pool_size=_KEPT, max_overflow=_MORE, pool_pre_ping=True)
 
 
 def make_autocommit_engine(address: sa.URL, lock_timeout: float, *, connections: int) -> sa.Engine:
-    """An engine for single statements, by so many connections, which are kept: no transaction, and no look at whether a
-    connection is still there, each of which would be a way to the server and back."""
+    """An engine for single statements with this many permanent connections, without transactions or connection checks:
+    each would cost a round trip to the server."""
     return _engine(address, lock_timeout, pool_size=connections, max_overflow=0, isolation_level="AUTOCOMMIT")
 
 
@@ -148,7 +148,8 @@ count_commit = sa.update(commits).values(number=commits.c.number + 1)
 
 
 class SingleStatements:
-    """Threads share it. `engine` is one of `connect.make_autocommit_engine`, `name` that of the database in errors."""
+    """Runs single statements outside transactions; threads share it. `engine` is one of
+    `connect.make_autocommit_engine`, `name` the database's name in errors."""
 
     def __init__(self, engine: sa.Engine, name: str) -> None:
         self._engine = engine
@@ -156,7 +157,7 @@ class SingleStatements:
         self._closed = False
 
     def rows(self, statement: sa.Executable, values: dict[str, Any]) -> Sequence[sa.RowMapping]:
-        """The rows that a statement returns, none where it returns none. After a lost connection it is run once more.
+        """The rows that a statement returns, if any. After a lost connection it is run once more.
 
         Raises StorageUnavailable where the server cannot be reached, or when this was closed, and DatabaseBusy where no
         connection is free in time.
@@ -199,7 +200,7 @@ _lock_one = sa.text(f"SELECT pg_advisory_xact_lock_shared({WRITE_KEY}), pg_advis
 
 
 def write_lock(connection: sa.Connection, of: str | None) -> None:
-    """Have the transaction wait until it is the only one that writes `of` something, or at all, and remain so to its end."""
+    """Wait until the transaction is the only one that writes `of` something (None: at all), until its end."""
     if of is None:
         connection.execute(_lock_all)
     else:
@@ -208,8 +209,8 @@ def write_lock(connection: sa.Connection, of: str | None) -> None:
 
 
 def hold_service_lock(engine: sa.Engine, name: str) -> None:
-    """Have every connection of a service hold the services' lock, which many may: also those that are made after the server
-    was started again. Raises DatabaseBusy from then on where a migration takes longer than a connection waits for locks."""
+    """Have every connection of a service hold the services' shared lock, including connections made after a restart of
+    the server. Raises DatabaseBusy from then on if a migration takes longer than a connection waits for locks."""
 
     @sa.event.listens_for(engine, "connect")
     def hold(connection: Any, _: ConnectionPoolEntry) -> None:
@@ -224,7 +225,8 @@ def hold_service_lock(engine: sa.Engine, name: str) -> None:
 
 @contextmanager
 def migration_lock(address: sa.URL, lock_timeout: float) -> Iterator[None]:
-    """Held inside: the lock under which no service runs. Raises ServiceRuns where one does not end within the time [s]."""
+    """Context that holds the lock under which no service runs. Raises ServiceRuns if a service does not end within this
+    time [s]."""
     name = shown(address)
     engine = make_engine(address, lock_timeout)
     try:

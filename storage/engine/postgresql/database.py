@@ -58,7 +58,7 @@ SELECT (SELECT number FROM commits) AS version,
 
 
 class ServerWatch(Watch):
-    """One statement for all who ask."""
+    """The watch of a database on a server: one statement answers all waiting callers."""
 
     def __init__(self, statements: connect.SingleStatements, name: str, patience: float) -> None:
         super().__init__(name, patience)
@@ -152,7 +152,7 @@ class ServerDatabase(Database):
         return {"database": "the server is a standby and read-only: connect to the primary server"} if standby else {}
 
     def damage(self, connection: sa.Connection) -> list[str]:  # noqa: ARG002  (pages are the server's: pg_amcheck)
-        """Nothing: the server refuses rows that refer to missing ones, and checks its pages itself."""
+        """Always empty: the server refuses rows that refer to missing ones, and checks its pages itself."""
         return []
 
     def close(self) -> None:
@@ -163,7 +163,7 @@ class ServerDatabase(Database):
         self._sharing.close()
 
     def migrate(self) -> None:
-        """Make the tables of an empty database, or run the steps that it lacks, not under a running service."""
+        """Create the tables of an empty database, or run the missing migrations, but never under a running service."""
         to_migrate = self._to_migrate()
         if to_migrate is None:
             return
@@ -185,8 +185,8 @@ class ServerDatabase(Database):
                 raise
 
     def _to_migrate(self) -> Literal["empty", "older"] | None:
-        """What a migration would find: an empty database; an older one, which a service may be using at this moment; None
-        where nothing is to do. Raises where the database's text is not UTF-8."""
+        """Whether a migration is needed: "empty", "older" (a service may be using it now), or None. Raises
+        StorageUnavailable if the database's text is not UTF-8."""
         with self.reading() as connection:
             _require_utf8(connection, self.name)
             revision = current(connection)
@@ -216,7 +216,8 @@ def open_server(address: sa.URL, *, lock_timeout: float, serving: bool = False) 
 
 
 def find_server(address: sa.URL) -> ServerDatabase:
-    """Open a database on a server to read it as it is. Raises DatabaseTooNew, StorageUnavailable where it has no tables."""
+    """Open a database on a server for reading, at its present revision. Raises DatabaseTooNew, StorageUnavailable if it
+    has no tables."""
     database = ServerDatabase(address, lock_timeout=LOCK_TIMEOUT, found=True)
 
     def check(connection: sa.Connection) -> None:
@@ -229,7 +230,7 @@ def find_server(address: sa.URL) -> ServerDatabase:
 
 
 def server_has_tables(address: sa.URL) -> bool:
-    """Whether the database holds this program's tables. Raises StorageUnavailable where there is no such database."""
+    """Whether the database has this program's tables. Raises StorageUnavailable if there is no such database."""
     with (
         closing(ServerDatabase(address, lock_timeout=LOCK_TIMEOUT, found=True)) as database,
         database.reading() as connection,

@@ -25,7 +25,7 @@ _MAX_LISTED = 20
 
 
 def damage(connection: Connection) -> list[str]:
-    """What is wrong with the pages, the indexes and the references of a database; empty where nothing is."""
+    """Damage to the pages, indexes and references of a database, each a sentence; empty if there is none."""
     pages = [str(row[0]) for row in connection.exec_driver_sql(f"PRAGMA integrity_check({_MAX_LISTED})")]
     broken = connection.exec_driver_sql("PRAGMA foreign_key_check").fetchmany(_MAX_LISTED)
     return [f"integrity: {line}" for line in pages if line != "ok"] + [
@@ -34,7 +34,7 @@ def damage(connection: Connection) -> list[str]:
 
 
 def require_whole(path: Path) -> None:
-    """Raise sqlite3.DatabaseError unless the file at `path` is a whole database of this program, at whatever revision."""
+    """Raise sqlite3.DatabaseError unless the file at `path` is an undamaged database of this program, at any revision."""
     with closing(sqlite3.connect(connect.read_only(path), uri=True)) as connection:
         (line,) = connection.execute("PRAGMA integrity_check(1)").fetchone()
         if line != "ok":
@@ -44,7 +44,7 @@ def require_whole(path: Path) -> None:
 
 
 def copy(source: Path, target: Path, *, lock_timeout: float) -> None:
-    """Copy the database at `source` to the new file `target`, one state of it, while others read and write.
+    """Copy the database at `source` to the new file `target`, in one consistent state, while others read and write.
 
     All pages are copied in one step: with a rollback journal, commits wait for it; stepwise copying starts again at
     every commit and need not end. `target` is an empty file until the copy is whole.
@@ -66,7 +66,8 @@ def copy(source: Path, target: Path, *, lock_timeout: float) -> None:
 
 
 def copy_beside(source: Path, suffix: str, *, lock_timeout: float) -> Path:
-    """Copy the database at `source` to `FILE-suffix`, or to `FILE-suffix.2` and so on where that holds something else.
+    """Copy the database at `source` to `FILE-suffix`, or to the first of `FILE-suffix.2` and so on without other
+    content.
 
     Returns the copy's path; it is there whole or not at all. The caller holds the write lock.
     """
@@ -85,13 +86,14 @@ def copy_beside(source: Path, suffix: str, *, lock_timeout: float) -> Path:
 
 
 def names_beside(path: Path, suffix: str) -> Iterator[Path]:
-    """`FILE-suffix`, then `FILE-suffix.2`, `FILE-suffix.3`, and so on without end."""
+    """The endless sequence `FILE-suffix`, `FILE-suffix.2`, `FILE-suffix.3`, …"""
     yield path.with_name(f"{path.name}-{suffix}")
     yield from (path.with_name(f"{path.name}-{suffix}.{number}") for number in itertools.count(2))
 
 
 def renamed(path: Path, target: Path) -> Path:
-    """Give a file another name, in place of what has it, so that a power cut leaves the one or the other; the new name."""
+    """Rename a file durably, replacing any file of the new name; after a power cut one of the two is there. Returns the
+    new path."""
     path.replace(target)
     folder = os.open(target.parent, os.O_RDONLY)
     try:
@@ -102,7 +104,7 @@ def renamed(path: Path, target: Path) -> Path:
 
 
 def copy_whole(source: Path, target: Path, lock_timeout: float) -> None:
-    """Copy the database at `source` into the new file `target`, which is whole only at the end."""
+    """Copy the database at `source` into the new file `target`, complete only at the end."""
     with (
         closing(sqlite3.connect(connect.read_only(source), uri=True, timeout=lock_timeout)) as origin,
         closing(sqlite3.connect(target)) as copied,
@@ -117,7 +119,7 @@ _LOG, _SHARED = "-wal", "-shm"
 
 
 def restore(url: str, backup: Path, *, lock_timeout: float = LOCK_TIMEOUT) -> Path | None:
-    """Put the database in the file `backup` in the place of the one at `url`, whatever the revisions of the two.
+    """Replace the database at `url` by the file `backup`, at any revisions of the two.
 
     Returns where the replaced file is kept, `FILE-replaced` beside it, None where there was none. Raises ServiceRuns while a
     service uses the database, DatabaseBusy while anything else does, StorageUnavailable where `backup` is no whole database;
@@ -146,7 +148,8 @@ def restore(url: str, backup: Path, *, lock_timeout: float = LOCK_TIMEOUT) -> Pa
 
 
 def _keep_replaced_file(path: Path) -> Path:
-    """The file under a second name, with its log; nothing beside it that would be taken for the restored one's log."""
+    """Keep the replaced file with its log under a second name; no log remains that the restored file would read as its
+    own."""
     _settle(path)
     kept_file = next(name for name in names_beside(path, "replaced") if not name.exists())
     log = path.with_name(path.name + _LOG)
@@ -159,7 +162,7 @@ def _keep_replaced_file(path: Path) -> Path:
 
 
 def _settle(path: Path) -> None:
-    """Bring the log's commits into the file, so that the file is all there is; a damaged one is left with its log."""
+    """Write the log's commits into the file, so that the file alone is complete; a damaged file is left with its log."""
     try:
         with closing(sqlite3.connect(path, timeout=0.0, isolation_level=None)) as connection:
             connection.execute("PRAGMA journal_mode=DELETE")

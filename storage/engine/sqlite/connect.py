@@ -42,12 +42,12 @@ MODE = 0o600
 
 
 def make_new(path: Path) -> None:
-    """Make an empty file. Raises FileExistsError where something is there."""
+    """Create an empty file. Raises FileExistsError if the path exists."""
     os.close(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, MODE))
 
 
 def make_if_missing(path: Path) -> None:
-    """Make an empty file where nothing is there."""
+    """Create an empty file unless the path exists."""
     with suppress(FileExistsError):
         make_new(path)
 
@@ -95,7 +95,7 @@ _MODE_RETRY = 0.02
 
 
 def path_of(url: str) -> Path:
-    """The file of `sqlite:///path`; ValueError on anything else."""
+    """The file path in `sqlite:///path`; ValueError on any other address."""
     scheme, separator, remainder = url.partition("://")
     if not separator or scheme != "sqlite":
         raise ValueError(
@@ -111,19 +111,19 @@ def path_of(url: str) -> Path:
 
 
 def wanted_journal_mode(path: Path, lock_timeout: float) -> str | None:
-    """JOURNAL_MODE where the file is in it already, None where it is not. Read without changing it."""
+    """JOURNAL_MODE if the file is in it already, else None; read without changing it."""
     with closing(sqlite3.connect(path, timeout=lock_timeout, isolation_level=None)) as connection:
         return JOURNAL_MODE if _mode(connection) == JOURNAL_MODE else None
 
 
 def found_journal_mode(path: Path, lock_timeout: float) -> str:
-    """The journal mode that an existing file is in, read without changing it."""
+    """The journal mode of an existing file, read without changing it."""
     with closing(connect_shared(path, lock_timeout, writable=False)) as connection:
         return _mode(connection)
 
 
 def set_journal_mode(path: Path, lock_timeout: float) -> str:
-    """Put the file into JOURNAL_MODE; returns the mode in force.
+    """Set the file's journal mode to JOURNAL_MODE; returns the mode in force.
 
     A file on a volume that cannot share memory between processes stays with its rollback journal, "delete".
     Call it under the `WriteLock`. Raises StorageUnavailable where the file is in some third mode.
@@ -150,12 +150,12 @@ def _mode(connection: sqlite3.Connection) -> str:
 
 
 def read_only(path: Path) -> str:
-    """The file's URI for connections that only read: they make no file where it is missing, and write back no log."""
+    """The file's URI for read-only connections, which never create the file or write back its log."""
     return f"{path.absolute().as_uri()}?mode=ro"
 
 
 class _Connection(sqlite3.Connection):
-    """A connection that can end the statements which nobody has read to their end.
+    """A connection that can end statements whose results were not read to the end.
 
     SQLite keeps the state of the database that such a statement began to read, beyond the end of its transaction: the
     next transaction of the connection would read old rows. An error in the middle of a result leaves one for as long as
@@ -177,7 +177,7 @@ class _Connection(sqlite3.Connection):
 
 
 def connect_shared(path: Path, lock_timeout: float, *, writable: bool) -> _Connection:
-    """A connection of the driver that threads may share. Its transactions begin by statements alone."""
+    """A driver connection that threads may share. Transactions on it begin only by an explicit statement."""
     address, uri = (str(path), False) if writable else (read_only(path), True)
     return _Connection(address, uri=uri, timeout=lock_timeout, isolation_level=None, check_same_thread=False)
 
@@ -185,7 +185,7 @@ def connect_shared(path: Path, lock_timeout: float, *, writable: bool) -> _Conne
 def make_engine(
     path: Path, lock_timeout: float, *, foreign_keys: bool = True, pooled: bool = True, writable: bool = True
 ) -> Engine:
-    """An engine on the file, with the settings of every connection. Its user begins each transaction by a statement."""
+    """An engine for the file, with the settings of every connection. Its user begins each transaction by a statement."""
     connect = partial(connect_shared, path, lock_timeout, writable=writable)
     # No upper bound: a connection is cheap, and the threads that use one are bounded elsewhere.
     pool = {"poolclass": QueuePool, "pool_size": 8, "max_overflow": -1} if pooled else {"poolclass": NullPool}
@@ -210,7 +210,7 @@ _FIRST_RETRY, _LONGEST_RETRY = 0.0005, 0.005
 
 
 class WriteLock:
-    """The lock of one database file, `FILE-lock`; every process that writes the file takes it. `close` it at the end."""
+    """The lock of one database file, `FILE-lock`, held by every process that writes the file. `close` it at the end."""
 
     def __init__(self, path: Path, timeout: float) -> None:
         self._path = path.with_name(f"{path.name}-lock")
@@ -220,9 +220,9 @@ class WriteLock:
 
     @contextmanager
     def held(self) -> Iterator[None]:
-        """Hold the lock inside.
+        """Context that holds the lock.
 
-        Raises DatabaseBusy where it is not free in time, StorageUnavailable where its file cannot be made.
+        Raises DatabaseBusy if it is not free in time, StorageUnavailable if its file cannot be created.
         """
         deadline = time.monotonic() + self._timeout
         if not self._thread_lock.acquire(timeout=self._timeout):
@@ -264,9 +264,9 @@ class WriteLock:
 
 @contextmanager
 def service_lock(path: Path) -> Iterator[None]:
-    """Hold the lock of the database at `path` inside.
+    """Context that holds the service's lock of the database at `path`.
 
-    Raises ServiceRuns where another holds it, StorageUnavailable where its file cannot be made.
+    Raises ServiceRuns if another holds it, StorageUnavailable if its file cannot be created.
     """
     lock_file = path.with_name(f"{path.name}-service")
     with open(_lock_file(lock_file), "rb+") as file:
@@ -291,13 +291,13 @@ def _lock_file(path: Path) -> int:
 
 
 def translated(path: Path) -> AbstractContextManager[None]:
-    """Raise the store's own errors, naming the file, for what driver and pool raise inside."""
+    """Context that raises errors of driver and pool as the storage's own, which name the file."""
     return translated_by(partial(_store_error, path), DRIVER_ERRORS)
 
 
 @contextmanager
 def transaction(engine: Engine, begin: str) -> Iterator[Connection]:
-    """A connection inside a transaction that the statement `begin` has begun: committed at the end, or rolled back."""
+    """Context with a connection in a transaction begun by the statement `begin`: committed at the end, or rolled back."""
     with engine.begin() as connection:
         connection.exec_driver_sql(begin)
         yield connection

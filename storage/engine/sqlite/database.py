@@ -25,9 +25,9 @@ from storage.migrations.upgrade import current, head, upgrade
 
 
 def _fault_of_file(path: Path, journal_mode: str) -> str | None:
-    """What is wrong with the file: it is not there, does not answer at the code's revision, or may not be written.
+    """The fault of the file, if any: it is missing, does not answer, is at another revision, or cannot be written.
 
-    Who writes now holds nothing up: a reader of the write-ahead log waits for no writer, and where there is none a commit
+    A present writer delays nothing: a reader of the write-ahead log waits for no writer, and without that log a commit
     in progress shows that the file is in use.
     """
     if not path.exists():
@@ -55,7 +55,8 @@ _KEY = "SELECT key_id, scope, note, clutches, expires_at FROM access_key WHERE s
 
 
 class FileWatch(Watch):
-    """A connection of its own, shared by threads. With a write-ahead log it waits for nobody but the disk."""
+    """The watch of a database file: a connection of its own, shared by threads. With a write-ahead log it waits for no
+    lock."""
 
     def __init__(self, path: Path, lock_timeout: float, *, writable: bool = True) -> None:
         super().__init__(f"the database {path}", lock_timeout)
@@ -74,8 +75,8 @@ class FileWatch(Watch):
             return [self._snapshot(version, question) for question in questions]
 
     def _snapshot(self, version: int, question: Question) -> Snapshot:
-        """What the rest of a request relies on: whether keys are needed, what its key grants, its clutch's revision, all at
-        one `version` of the file."""
+        """The state for a whole request, at one `version` of the file: whether keys are needed, the key's permissions,
+        and the clutch's revision."""
         any_key = self._row(_ANY_KEY)
         key = None if question.secret_sha256 is None else self._row(_KEY, question.secret_sha256)
         revision = None if question.clutch_id is None else self._row(_REVISION, question.clutch_id)
@@ -87,7 +88,7 @@ class FileWatch(Watch):
         )
 
     def _row(self, query: str, *values: object) -> tuple[Any, ...] | None:
-        """The first row of a query by key as it is now, None where there is none; asked of the file once a commit."""
+        """The present first row of a query, None if there is none; read from the file once per commit."""
         key = (query, values)
         if key not in self._rows:
             self._rows[key] = self._first(query, values)
@@ -111,7 +112,7 @@ class FileWatch(Watch):
 
 
 class FileDatabase(Database):
-    """An open file. Made by `open_file`."""
+    """An open database file. Made by `open_file`."""
 
     path: Path
     journal_mode: str
@@ -172,7 +173,8 @@ class FileDatabase(Database):
 
 
 def find_file(path: Path) -> FileDatabase:
-    """Open a file to read it as it is, whatever its revision up to this code's; nothing is made or migrated.
+    """Open a file for reading, at its present revision, which may be older than this code's; nothing is created or
+    migrated.
 
     Raises DatabaseTooNew as `open_file` does, StorageUnavailable where there is no such file.
     """
@@ -183,7 +185,7 @@ def find_file(path: Path) -> FileDatabase:
 
 
 def back_up(url: str, target: Path) -> None:
-    """A consistent copy of the database at `target`, at the revision that it is at, while others read and write.
+    """A consistent copy of the database at `target`, at the database's revision, while others read and write.
 
     Raises FileExistsError where `target` exists, StorageUnavailable as `find_file` does, ValueError on another address.
     """
@@ -193,7 +195,7 @@ def back_up(url: str, target: Path) -> None:
 
 
 def open_file(path: Path, *, lock_timeout: float = LOCK_TIMEOUT, serving: bool = False) -> FileDatabase:
-    """Open the file at `path`, make it where it is not there, and run the migrations that it lacks.
+    """Open the file at `path`, create it if needed, and run missing migrations.
 
     A file is copied before it is migrated, to `FILE-before-REVISION` beside it, and is not migrated under a running service;
     `serving`: it is the service itself that opens it, and holds `service_lock`.
@@ -215,7 +217,7 @@ def open_file(path: Path, *, lock_timeout: float = LOCK_TIMEOUT, serving: bool =
 
 
 def _mode_if_up_to_date(path: Path, lock_timeout: float) -> str | None:
-    """The journal mode of a file that needs no change; None where it needs one, is not there, or cannot be read."""
+    """The journal mode of a file that needs no change; None if it needs one, is missing, or cannot be read."""
     if not path.is_file():
         return None
     try:
@@ -229,7 +231,8 @@ def _mode_if_up_to_date(path: Path, lock_timeout: float) -> str | None:
 
 
 def _migrate(path: Path, lock_timeout: float, *, serving: bool) -> None:
-    """Run the missing steps in one immediate transaction; the caller holds the write lock, so that one process does."""
+    """Run the missing migrations in one immediate transaction; the caller holds the write lock, so that only one
+    process does."""
     # A step may rebuild a table that others refer to, so keys are checked once at the end.
     engine = connect.make_engine(path, lock_timeout, foreign_keys=False, pooled=False)
     with connect.transaction(engine, "BEGIN") as connection:
