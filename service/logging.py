@@ -85,7 +85,7 @@ class Queued(logging.Handler):
     def __init__(self, stream: TextIO, form: logging.Formatter, most: int = MAX_WAITING_BYTES) -> None:
         super().__init__()
         self.setFormatter(form)
-        self._file, self._encoding, self._most = stream.fileno(), stream.encoding, most
+        self._file, self._encoding, self._most = _file_of(stream), stream.encoding, most
         self._lines: deque[bytes | int] = deque()  # a number: so many were dropped here
         self._waiting = self._written = 0  # bytes
         self._changed = threading.Condition()
@@ -136,6 +136,14 @@ class Queued(logging.Handler):
                     self._waiting -= taken
                     self._written += taken
                     self._changed.notify_all()
+
+
+def _file_of(stream: TextIO) -> int:
+    """A stream's file; that of standard error where it has none, as one that a test has put in its place."""
+    try:
+        return stream.fileno()
+    except OSError:
+        return 2
 
 
 def _of_dropped(number: int) -> logging.LogRecord:

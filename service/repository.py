@@ -303,7 +303,10 @@ def replace_results(database: Database, state: ClutchHistory, computed: Results,
 
 
 def store(connection: Connection, clutch_id: str, computed: Results) -> None:
-    """Replace a clutch's stored results by these. The caller moves the revision on."""
+    """Replace a clutch's stored results by these. The caller moves the revision on. Raises ValueError for tracks without
+    the summary that follows from them."""
+    if computed.tracking is not None and computed.summary is None:
+        raise ValueError("tracks are stored with the summary that follows from them")
     if computed.levels or computed.receipts or computed.corrected:
         rows = runs.keys(connection, clutch_id)
         for run_id, own in computed.levels.items():
@@ -319,8 +322,10 @@ def store(connection: Connection, clutch_id: str, computed: Results) -> None:
         assumptions.clear_corrected_cofs(connection, clutch_id)
     for run_id, cofs in computed.corrected.items():
         assumptions.write_corrected_cofs(connection, rows[run_id], cofs)
+    states_sum = None
     if computed.tracking is not None:
         _store_tracking(connection, clutch_id, computed.tracking)
+        states_sum = results.states_sum(connection, clutch_id)
     if computed.summary is not None:
         clutches.set_summary(
             connection,
@@ -330,6 +335,7 @@ def store(connection: Connection, clutch_id: str, computed: Results) -> None:
             life=computed.summary.get("life", ""),
             state=state_of(computed.summary, disputed=False)["name"],
             if_disputed=state_of(computed.summary, disputed=True)["name"],
+            states_sum=states_sum,
         )
         raising.evaluate(connection, clutch_id)
 
@@ -367,7 +373,6 @@ def _store_tracking(connection: Connection, clutch_id: str, tracking: Tracking) 
     results.put_predictions(connection, clutch_id, predictions)
     results.clear_filter_states(connection, clutch_id)
     results.put_filter_states(connection, clutch_id, filters)
-    clutches.set_states_sum(connection, clutch_id, results.states_sum(connection, clutch_id))
 
 
 def states_finding(connection: Connection, row: ClutchRow) -> str | None:

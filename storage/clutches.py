@@ -192,12 +192,21 @@ def set_record(
 
 
 def set_summary(
-    connection: Connection, clutch_id: str, rank: float, summary: Json, *, life: str, state: str, if_disputed: str
+    connection: Connection,
+    clutch_id: str,
+    rank: float,
+    summary: Json,
+    *,
+    life: str,
+    state: str,
+    if_disputed: str,
+    states_sum: int | None = None,
 ) -> None:
     """Replace a clutch's summary and rank for lists; its state becomes `state`, or `if_disputed` if data and model
-    disagree in `life`. Raises LookupError on an unknown clutch."""
+    disagree in `life`; and the checksum of its filter states, unless None. Raises LookupError on an unknown clutch."""
     state_name = lambda row: if_disputed if row["disputed"] == life else state  # noqa: E731
-    _change(connection, clutch_id, {"rank": rank, "summary": to_text(summary), "state": state_name})
+    states = {} if states_sum is None else {"states_sum": states_sum}
+    _change(connection, clutch_id, {"rank": rank, "summary": to_text(summary), "state": state_name} | states)
 
 
 def set_disputed(connection: Connection, clutch_id: str, disputed: str | None, *, state: str) -> None:
@@ -210,11 +219,6 @@ def set_silent(connection: Connection, clutch_id: str, silent: str | None, *, st
     """Store since when a clutch's rig has sent nothing (None: it is not silent), and the resulting state. Raises
     LookupError on an unknown clutch."""
     _change(connection, clutch_id, {"silent": silent, "state": state})
-
-
-def set_states_sum(connection: Connection, clutch_id: str, states_sum: int) -> None:
-    """Note which filter states are the clutch's. Raises LookupError on an unknown one."""
-    _change(connection, clutch_id, {"states_sum": states_sum})
 
 
 def _change(connection: Connection, clutch_id: str, columns: Mapping[str, Any]) -> None:

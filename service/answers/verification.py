@@ -36,13 +36,14 @@ from storage.tables import CHECKSUM, metadata, run
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Checked:
-    """The findings of a check, one sentence each; the numbers of runs, inspections and photographs checked; and the
-    numbers of results by earlier releases, which are recomputed but not compared."""
+    """The findings of a check, one sentence each; the numbers of runs, inspections and photographs checked, and of
+    clutches whose results were recomputed; and the numbers of results by earlier releases, which are not compared."""
 
     findings: tuple[str, ...]
     runs: int = 0
     inspections: int = 0
     photographs: int = 0
+    recomputed: int = 0
     earlier: Mapping[str, int] = field(default_factory=dict)
 
 
@@ -56,6 +57,7 @@ def check(database: Database, clutch_id: str, *, recompute: bool) -> Checked:
         content.add(_finished(part, database, clutch_id))
     if recompute and not content.findings:
         content.add(_finished(check_results, database, clutch_id))
+        content.recomputed += 1
     return Checked(**vars(content))
 
 
@@ -64,7 +66,7 @@ class _Sum:
 
     def __init__(self) -> None:
         self.findings: tuple[str, ...] = ()
-        self.runs = self.inspections = self.photographs = 0
+        self.runs = self.inspections = self.photographs = self.recomputed = 0
         self.earlier: Counter[str] = Counter()
 
     def add(self, checked: Checked) -> None:

@@ -118,7 +118,7 @@ def verify(
     from storage.engine.integrity import other_schema  # start-up time
 
     use_one_blas_thread()
-    findings = runs = inspections = photographs = 0
+    findings = runs = inspections = photographs = recomputed = 0
     earlier: Counter[str] = Counter()
 
     def tell(lines: Sequence[str]) -> int:
@@ -140,7 +140,7 @@ def verify(
             checked = verification.check(opened, clutch_id, recompute=clutch_id in chosen)
             findings += tell(checked.findings)
             runs, inspections = runs + checked.runs, inspections + checked.inspections
-            photographs += checked.photographs
+            photographs, recomputed = photographs + checked.photographs, recomputed + checked.recomputed
             earlier.update(checked.earlier)
             progress.advance(task)
     for version, count in sorted(earlier.items()):
@@ -150,7 +150,7 @@ def verify(
     if inspections:
         print_line(f"{inspections} inspections with {photographs} photographs were checked")
     checked_runs = f"{runs} runs of {len(ids)} clutches were checked"
-    summary = f"{checked_runs}, {len(chosen)} of the clutches computed again: {findings} findings"
+    summary = f"{checked_runs}, {recomputed} of the clutches computed again: {findings} findings"
     if findings:
         fail(summary)
     print_line(summary)

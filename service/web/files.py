@@ -102,7 +102,7 @@ async def received(request: Request, path: Path, filename: str) -> tuple[str, Ri
             await written(request.stream(), file)
         return filename, None
     async with opened(path, "wb") as file:
-        form = await _StreamedForm(request, file).parse()
+        form = await _UploadForm(request, file).parse()
     sent = next((part for part in form.values() if isinstance(part, UploadFile)), None)
     if sent is None:
         raise InvalidError("the form must have exactly one file, a field with a file name")
@@ -113,7 +113,7 @@ async def received(request: Request, path: Path, filename: str) -> tuple[str, Ri
     return sent.filename or filename, profile
 
 
-class _StreamedForm(MultiPartParser):
+class _UploadForm(MultiPartParser):
     """A form of one file and of a few texts: the file is written as it arrives, the texts are in memory."""
 
     def __init__(self, request: Request, file: IO[bytes]) -> None:

@@ -24,7 +24,7 @@ from storage.engine.opening import open_database
 from storage.migrations import upgrade as migrations
 from storage.results import FitRow
 from storage.runs import RunRow
-from storage.tables import CHECKSUM, metadata
+from storage.tables import CHECKSUM, clutch, metadata
 
 CLUTCH = "bench3-017"
 
@@ -201,7 +201,8 @@ def reseal(connection: Connection) -> None:
         if CHECKSUM in table.c:
             amend(connection, table, [true()])
     for clutch_id in clutches.all_ids(connection):
-        clutches.set_states_sum(connection, clutch_id, results.states_sum(connection, clutch_id))
+        states_sum = results.states_sum(connection, clutch_id)
+        amend(connection, clutch, [clutch.c.clutch_id == clutch_id], states_sum=states_sum)
 
 
 def take_back(connection: Connection) -> None:

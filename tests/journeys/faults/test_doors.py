@@ -219,6 +219,8 @@ def clocked(path: Path, offset: str) -> Iterator[tuple[Server, Path]]:
         "FAKETIME_NO_CACHE": "1",
         "FAKETIME_DONT_FAKE_MONOTONIC": "1",
         "DONT_FAKE_MONOTONIC": "1",
+        # one process, so that none waits for another's lock of the file: with these settings libfaketime fails each sleep
+        "CLUTCHLIFE_WORKERS": "0",
     }
     with serving(path, environment=environment) as server:
         yield server, clock

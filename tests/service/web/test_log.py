@@ -56,3 +56,14 @@ def test_a_log_that_nobody_reads_holds_up_no_request_and_is_whole_once_it_is_rea
     assert asked == [f"probe-{number}" for number in range(100)], "each line is there, in its order"
     assert "POST /v1/clutches/{clutch_id}/runs 201" in [line["message"] for line in written]
     assert written[-1]["message"].startswith("Finished server process"), "nothing is lost at the end"
+
+
+@pytest.mark.slow
+def test_a_service_whose_log_nobody_reads_stops_in_order(tmp_path: Path, pipe: tuple[int, int]) -> None:
+    """It waited for ever, and with bytes in Python's own buffer it would end by SIGABRT."""
+    with serving(tmp_path / "a.db", log=("debug", pipe[1])) as server:
+        with httpx2.Client(base_url=server.url, timeout=20) as http:
+            for _ in range(100):
+                assert http.get("/livez").status_code == 200
+        assert server.stop() == 0
+    os.close(pipe[1])
