@@ -82,8 +82,40 @@ def common_cause_of(runs: Sequence[Run]) -> CommonCause | None:
     near = _near(dated, found)
     as_sent = _log_probability([runs[index] for index in near])
     log_odds = [cause.log_prior + _log_given(runs, near, cause) - as_sent for cause in found]
-    total = float(np.logaddexp.reduce(log_odds))
-    return None if total < math.log(criteria.HELD) else replace(found[int(np.argmax(log_odds))], log_odds=total)
+    total, best = float(np.logaddexp.reduce(log_odds)), found[int(np.argmax(log_odds))]
+    if total < math.log(criteria.HELD):
+        return None
+    if best.name == TWO_CLUTCHES:
+        best = _parted(runs, near, dated, best)
+    return replace(best, log_odds=total)
+
+
+def _parted(runs: Sequence[Run], near: Sequence[int], dated: Sequence[_Dated], cause: CommonCause) -> CommonCause:
+    """Runs of two clutches parted by their COF, too, where dates and cycles do not say whose a run is: two runs change
+    places where the cycles of neither clutch fall then, and they are more probable so."""
+    place, log_given = {run.index: run for run in dated}, _log_given(runs, near, cause)
+
+    def rises(indices: set[int]) -> bool:
+        starts = [run.start for run in dated if run.index in indices]
+        return all(earlier <= later for earlier, later in itertools.pairwise(starts))
+
+    while True:
+        other, own = set(cause.runs), place.keys() - set(cause.runs)
+        ways = [
+            (other - {theirs} | {ours}, own - {ours} | {theirs})
+            for theirs, ours in itertools.product(other & set(near), own & set(near))
+            if not runs[ours].fixed
+        ]
+        parted = [
+            replace(cause, runs=tuple(sorted(way)), cycles=tuple(runs[index].cycles for index in sorted(way)))
+            for way, rest in ways
+            if rises(way) and rises(rest)
+        ]
+        weighed = [_log_given(runs, near, each) for each in parted]
+        if max(weighed, default=-math.inf) <= log_given:
+            return cause
+        log_given = max(weighed)
+        cause = parted[weighed.index(log_given)]
 
 
 def _by_date(runs: Sequence[Run]) -> list[_Dated]:
@@ -111,6 +143,10 @@ def _log_given(runs: Sequence[Run], near: Sequence[int], cause: CommonCause) -> 
         parts = ([index for index in near if (index in made_at) is other] for other in (False, True))
         return sum(_log_probability([runs[index] for index in part]) for part in parts if part)
     moved = [runs[index].at(made_at[index]) if index in made_at else runs[index] for index in near]
+    if cause.name == OFFSET:  # with any b: the gap that it leaves is as it may be, and not this one
+        before, first = [runs[index] for index in near if index not in made_at], runs[cause.runs[0]]
+        of_gap = log_cycles_of(_ordered([*before, first.at(cause.cycles[0])])) - log_cycles_of(_ordered(before))
+        return _log_probability(moved) - min(of_gap, 0.0)
     if cause.name == STUCK:
         moved = _ordered(moved)
         return log_probability_of(moved) - log_cycles_of(moved) + log_cycles_of(sent) + _log_pace(_by_date(sent))

@@ -22,7 +22,7 @@ from models.tracking.discrepancy import FUTURE, PAST, CourseDiscrepancy
 from models.tracking.filters.grid import Grid
 from models.tracking.measurement import Measurement
 from models.tracking.posterior import TrackPosterior
-from models.tracking.prior import weak
+from models.tracking.prior import TrackPrior, weak
 from tests.models.tracking.tracked_series import sent
 from tests.score.table import joined, percents, written
 from tests.statistical.forecasts import LAWS, STAGES, TESTS, followed
@@ -87,8 +87,8 @@ def never(count: int, seed: int) -> str:
     )
 
 
-def stated(count: int, seed: int, *, whole: bool) -> tuple[np.ndarray, np.ndarray]:
-    """The probability stated for each of `count` lives [n], and whether it came [n]."""
+def stated(count: int, seed: int, *, whole: bool, believed: TrackPrior = PRIOR) -> tuple[np.ndarray, np.ndarray]:
+    """The probability stated for each of `count` lives [n] by a prior, and whether it came [n]."""
     rng, told, came, grid = np.random.default_rng(seed), [], [], Grid()
     while len(told) < count:
         truth = TrackPosterior(
@@ -130,7 +130,7 @@ def stated(count: int, seed: int, *, whole: bool) -> tuple[np.ndarray, np.ndarra
             noise += outlying * PRIOR.outlying_size * PRIOR.size * rng.standard_normal(runs)
         zeta = np.linspace(0.0, last, runs)
         values = truth.values(zeta)[:, 0] + noise
-        drawn = grid.posterior(grid.from_history(PRIOR, sent(zeta, values)), 1_000, rng)
+        drawn = grid.posterior(grid.from_history(believed, sent(zeta, values)), 1_000, rng)
         passage = predict_first_passage(drawn, fraction=0.5, as_of=last)
         assert all(x is None or math.isfinite(x) for x in passage.end_of_life.values())
         told.append(passage.probability_of_reaching)

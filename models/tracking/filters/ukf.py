@@ -218,8 +218,8 @@ def _taken_in(
     kalman = UnscentedKalmanFilter(dimension, 1, gap, None, led_on, points)
     kalman.x, kalman.P, kalman.Q = mean, covariance, 1e-9 * np.eye(dimension)
     # δ has the deviation q at what was measured, now further on
-    density = 3.0 * (FORM_SIZE[kind] * prior.size / unit) ** 2 * (reference / history.span) ** 3
-    kalman.Q[DELTA, DELTA] += density * np.array([[gap**3 / 3.0, gap**2 / 2.0], [gap**2 / 2.0, gap]])
+    diffusion = 3.0 * (FORM_SIZE[kind] * prior.size / unit) ** 2 * (reference / history.span) ** 3
+    kalman.Q[DELTA, DELTA] += diffusion * np.array([[gap**3 / 3.0, gap**2 / 2.0], [gap**2 / 2.0, gap]])
     kalman.predict()
     values = measured(kalman.sigmas_f)  # of all sigma points at once
     growth = prior.relative_squared(value) if FORM_PROPORTIONAL[kind] else 1.0

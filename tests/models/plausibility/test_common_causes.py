@@ -98,6 +98,26 @@ def test_another_clutchs_runs_come_between() -> None:
     assert set(cycles) == {"o0", "o1", "o2", "o3", "o4"}
 
 
+def test_cof_parts_the_runs_of_two_clutches_where_their_cycles_meet() -> None:
+    """The other clutch is at 5,700 cycles half a day after this one is at 6,000, and this one was at 5,000 before: by cycles
+    and dates the two tests could be of either."""
+    own = life(TRUE)
+    other = life([0.0, 2_600.0, 5_700.0, 9_800.0, 13_400.0], np.zeros(5), name="o")
+    between = [each._replace(moment=own[4 + k].moment + 0.5 * DAY) for k, each in enumerate(other)]
+    cause, cycles = found([*own, *between])
+    assert cause.name == TWO_CLUTCHES
+    assert set(cycles) == {each.name for each in other}
+
+
+def test_a_counter_that_jumps_while_friction_stays_level_may_have_jumped_by_any_number() -> None:
+    """Ragged gaps, and once twenty of them in the time of one: any offset that leaves a gap like the others would do."""
+    gaps = 6e3 * np.exp(0.3 * np.random.default_rng(0).standard_normal(COUNT - 1))
+    true = np.round(np.append(0.0, np.cumsum(gaps)))
+    cause, cycles = found(life(np.where(TRUE < 5e3, true, true + 1.19e5), np.zeros(COUNT)))
+    assert cause.name == OFFSET
+    assert set(cycles) == {f"t{k}" for k in range(5, COUNT)}
+
+
 @pytest.mark.parametrize(
     "runs",
     [

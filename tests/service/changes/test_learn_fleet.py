@@ -241,7 +241,7 @@ def test_a_run_that_comes_before_its_clutch_is_brought_up_is_tracked_under_the_p
         post_fleet(client)
         post(client, "new", 6000.0, last=3000)
         with monkeypatch.context() as slow:
-            slow.setattr(learn_fleet, "_replaced", lambda *_: False)
+            slow.setattr(repository, "replace_results", lambda *_: False)
             assert "new" in refresh(url).left
         post_run(client, measured("next", 4000, wear(4000, 6000.0)), "new")
         assert life(client, "new")["prior"]["name"] == "weak"
