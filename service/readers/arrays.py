@@ -145,8 +145,11 @@ def _sources(tree: Tree, group: str, depth: int, above: Tree, stamps: Stamps) ->
             if data is not None and all(known_channel(key) == "time_s" for key in remaining):
                 label = next((_text(lowered[key]) for key in _LABELS if _text(lowered.get(key))), name)
                 data = replace(data, attributes={**node, **data.attributes})
-                for title, leaf in [*((key, node[key]) for key in remaining), (label, data)]:
-                    yield from _columns(title, leaf, path if remaining else group, {**stated, **node}, stamps)
+                own = path if remaining else group
+                unitless = {key: value for key, value in {**stated, **node}.items() if key.lower() not in UNITS}
+                for key in remaining:  # the unit is that of the data
+                    yield from _columns(key, node[key], own, unitless, stamps)
+                yield from _columns(label, data, own, {**stated, **node}, stamps)
             elif depth < _DEEPEST:
                 yield from _sources(node, path, depth + 1, stated, stamps)
         elif isinstance(node, Leaf):

@@ -96,7 +96,7 @@ def to_channels(table: Table, reading: Reading, limits: Limits) -> Channels:
     on too many values.
     """
     if table.parts:
-        return below_each_other([to_channels(part, reading, limits) for part in _parts(table)])
+        return below_each_other([to_channels(replace(part, parts=()), reading, limits) for part in table.parts])
     table, reading = widened(stacked_columns(with_constants(table, reading), reading), reading)
     constant, step = constants(table, reading), stated_step(table, reading)
     chosen = choose(table.columns, reading)
@@ -124,11 +124,6 @@ def to_channels(table: Table, reading: Reading, limits: Limits) -> Channels:
     refuse_no_torque(columns, line_of, reading)
     refuse_slips(columns, line_of, reading)
     return Channels(columns=columns, notices=tuple(notices), counts=counts, labels=labels(table.above))
-
-
-def _parts(table: Table) -> list[Table]:
-    """The parts of a file, each as a table of its own."""
-    return [replace(part, parts=()) for part in table.parts]
 
 
 def below_each_other(parts: Sequence[Channels]) -> Channels:

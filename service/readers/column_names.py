@@ -356,7 +356,7 @@ def _find(columns: Sequence[FileColumn], channel: str, name: str) -> int:
     if not exact and number.isdecimal():
         equal = [index for index, names in enumerate(forms) if bare in names]
         exact = equal[int(number) - 1 : int(number)] if int(number) else []
-    alike = [index for index, column in enumerate(columns) if key(column.name) == wanted]
+    alike = [at for at, own in enumerate(columns) if wanted in (key(own.name), key(f"{own.group}/{own.name}"))]
     for matches in (exact, alike):
         if len(matches) == 1:
             return matches[0]

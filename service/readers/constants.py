@@ -160,15 +160,13 @@ def _value(channel: str, choice: ColumnChoice, stated: Mapping[str, str]) -> flo
     text, unit = _stated_text(channel, choice, stated)
     match = _NUMBER.fullmatch(text)
     unit = unit or (match["unit"] if match else None) or CHANNELS[channel].unit
-    converted = conversion(channel, unit.strip("[]() "))
-    if match is None or converted is None:
+    value = _in_channel_unit(channel, match["number"], unit.strip("[]() ")) if match else None
+    if value is None:
         message = (
             f"map gives {channel} the value {text[:MAX_QUOTED]!r}: it must be a number in one of {spellings(channel)}"
         )
         raise InvalidError.of(message, code="invalid_map", pointer="/map", value=text)
-    value = np.array([float(match["number"].replace(",", "."))])
-    converted.apply(value)
-    return choice.factor * float(value[0]) + choice.offset
+    return choice.factor * value + choice.offset
 
 
 def _stated_text(channel: str, choice: ColumnChoice, stated: Mapping[str, str]) -> tuple[str, str | None]:
@@ -188,15 +186,20 @@ def _stated_text(channel: str, choice: ColumnChoice, stated: Mapping[str, str]) 
     return text, unit
 
 
+def _in_channel_unit(channel: str, number: str, unit: str) -> float | None:
+    """A number as it is written, in the channel's unit; None where it is in no unit of it."""
+    converted = conversion(channel, unit)
+    return None if converted is None else converted.factor * float(number.replace(",", ".")) + converted.offset
+
+
 def value_within(text: str, channel: str) -> tuple[float, str] | None:
     """The channel's value stated in a title or a sheet's name, in the channel's unit, and the text without it; None if
     there is none, or several."""
-    found = []
-    for match in _WITHIN.finditer(text[:MAX_QUOTED]):
-        if converted := conversion(channel, match["unit"]):
-            value = np.array([float(match["number"].replace(",", "."))])
-            converted.apply(value)
-            found.append((float(value[0]), " ".join(f"{text[: match.start()]} {text[match.end() :]}".split())))
+    found = [
+        (value, " ".join(f"{text[: match.start()]} {text[match.end() :]}".split()))
+        for match in _WITHIN.finditer(text[:MAX_QUOTED])
+        if (value := _in_channel_unit(channel, match["number"], match["unit"])) is not None
+    ]
     return found[0] if len(found) == 1 else None
 
 
@@ -260,12 +263,10 @@ def value_of_column(column: FileColumn, channel: str, unit: str | None = None) -
     if held := value_within(column.group, channel):
         return held[0], column.name
     match = _NUMBER.fullmatch(column.name)
-    converted = conversion(channel, unit) if unit else None
-    if match is None or match["unit"] or converted is None:
+    if match is None or match["unit"] or unit is None:
         return None
-    value = np.array([float(match["number"].replace(",", "."))])
-    converted.apply(value)
-    return float(value[0]), CELLS
+    value = _in_channel_unit(channel, match["number"], unit)
+    return None if value is None else (value, CELLS)
 
 
 def _without_empty_end(part: dict[int, NDArray[Any]], shared: int) -> dict[int, NDArray[Any]]:

@@ -81,19 +81,20 @@ _FOREIGN = {
     b"\x93NUMPY": "an array of NumPy, which has no titles (numpy.savetxt with header= writes them)",
     b"MULTI_STREAM_FIL": "a Dewesoft file (Dewesoft exports CSV, MATLAB, MDF4 and TDMS files)",
     b"FORMAT\0": "an MTS RPC file (RPC Pro and nCode save it as CSV or MATLAB file)",
-    b"\x94\x13": "an HBM catman file (catman exports CSV, MATLAB, MDF4 and TDMS files)",
-    b"\x91\x13": "an HBM catman file (catman exports CSV, MATLAB, MDF4 and TDMS files)",
-    b"CDF\x01": "a NetCDF 3 file (`nccopy -k nc4` makes HDF5 of it, `ncdump` text)",
-    b"CDF\x02": "a NetCDF 3 file (`nccopy -k nc4` makes HDF5 of it, `ncdump` text)",
-    b"CDF\x05": "a NetCDF 3 file (`nccopy -k nc4` makes HDF5 of it, `ncdump` text)",
     b"<hCNF": "an AiM file (RaceStudio exports CSV files)",
     b"LOGG": "a Vector BLF log (CANoe and CANape convert it with its database to MDF4 or CSV)",
     b"RIFF": "a RIFF file, as sound is kept in (save the channels as CSV or MATLAB file)",
     b":WFM#": "a Tektronix waveform (the oscilloscope saves CSV files too)",
     b"AG10": "a Keysight waveform (the oscilloscope saves CSV and HDF5 files too)",
     b"ARROW1": "an Arrow file (pyarrow, polars and pandas write Parquet as well)",
-    b"[{": "JSON: send it to POST /v1/clutches/ID/runs",
-    b"{": "JSON: send it to POST /v1/clutches/ID/runs",
+} | {
+    magic: what
+    for magics, what in {
+        (b"\x94\x13", b"\x91\x13"): "an HBM catman file (catman exports CSV, MATLAB, MDF4 and TDMS files)",
+        (b"CDF\x01", b"CDF\x02", b"CDF\x05"): "a NetCDF 3 file (`nccopy -k nc4` makes HDF5 of it, `ncdump` text)",
+        (b"[{", b"{"): "JSON: send it to POST /v1/clutches/ID/runs",
+    }.items()
+    for magic in magics
 }
 #: Beginnings that a text may have too.
 _AMBIGUOUS = {b"BM", b"LOGG", b"RIFF"}

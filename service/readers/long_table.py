@@ -120,7 +120,7 @@ def widened(table: Table, reading: Reading) -> tuple[Table, Reading]:
     if best is None or not recognised(_distinct(head[best]), named):
         return table, reading
     unit = next((index for index in words if index != best and all(map(is_unit, head[index]))), None)
-    timed = _time(columns, reading)
+    timed = _time(table, reading)
     numeric = [index for index, cells in head.items() if cells and all(map(is_value, cells))]
     value = _value(columns, numeric, best, reading)
     marked = next((index for index, column in enumerate(columns) if says_valid(column, reading)), None)
@@ -172,12 +172,15 @@ def _distinct(cells: Sequence[Any]) -> list[str]:
     return list(dict.fromkeys(map(str, cells)))
 
 
-def _time(columns: Sequence[FileColumn], reading: Reading) -> tuple[int, Any] | None:
-    """The column of times and its conversion to s."""
-    named = choices_of(reading).get("time_s")
+def _time(table: Table, reading: Reading) -> tuple[int, Any] | None:
+    """The column of times and its conversion to s; of several the only one that does not stand."""
+    columns, named = table.columns, choices_of(reading).get("time_s")
     if reading.time == NO_TIME or (named and named.is_constant()):
         return None
     places = range(len(columns)) if named else [index for index, column in enumerate(columns) if is_time(column)]
+    if len(places) > 1 and not named:
+        cells = table.read(dict.fromkeys(places, ""))
+        places = [at for at, held in zip(places, cells, strict=True) if (held != held[0]).any()]
     if len(places) > 1 and not named:
         shown = " and ".join(columns[index].shown() for index in places)
         raise several_times(shown)

@@ -28,6 +28,8 @@ _POINTS = (10.0, 0.1, 100.0)
 _OFF, _NEAR, _OUTSIDE = 5.0, 1.6, 1.25
 #: Rows of a sampled record that are no noise, rows of any run by which the others are known, and groups that are looked at.
 _MIN_SAMPLES, _MIN_ROWS, _MAX_GROUPS = 3, 6, 100
+#: Rows of a record that are looked at, of longer ones every n-th. Chosen: 1.4 million then take 0.03 s, all of them 0.4 s.
+_MAX_LOOKED_AT = 10_000
 #: Shares of the largest or usual value below which a clutch is open or at rest, by which levels differ, and by which one
 #: is that of other rows; and a speed's noise as a share of the largest speed. Chosen.
 _AT_REST, _LEVEL, _SAME, _NOISE = 0.05, 0.2, 0.02, 0.005
@@ -38,22 +40,23 @@ _SMOOTH = 0.9
 def refuse_slips(columns: Mapping[str, FloatArray], line_of: LineOf | None, reading: Reading) -> None:
     """Raise InvalidError naming the first row of those in which a pressure, torque or speed is in another unit, or has its
     decimal point elsewhere."""
-    needed = [columns.get(name) for name in ("pressure_bar", "speed_rpm", "torque_nm")]
-    pressure, speed, torque = needed
-    if reading.missing == NO_MISSING or pressure is None or speed is None or torque is None or speed.size < _MIN_ROWS:
+    needed = ("pressure_bar", "speed_rpm", "torque_nm")
+    if reading.missing == NO_MISSING or not columns.keys() >= {*needed} or columns["speed_rpm"].size < _MIN_ROWS:
         return
-    sampled = "time_s" in columns
+    sampled, step = "time_s" in columns, max(1, columns["speed_rpm"].size // _MAX_LOOKED_AT)
+    pressure, speed, torque = (columns[name][::step] for name in needed)
     found = _by_friction(pressure, speed, torque, sampled=sampled) or _by_levels(pressure, speed, sampled=sampled)
     found = found or (_by_jumps(speed) if sampled else None)
     if found is None:
         return
     channel, rows, factor = found
-    first, unit, value = int(rows[0]), CHANNELS[channel].unit, columns[channel][rows[0]]
-    more = f", as {rows.size} of {speed.size} rows" if rows.size > 1 else ""
-    question = "another unit" if rows.size > 1 else "its decimal point elsewhere"
+    first, unit, count = step * int(rows[0]), CHANNELS[channel].unit, step * rows.size
+    value = columns[channel][first]
+    more = f", as {count} of {columns[channel].size} rows" if count > 1 else ""
+    question = "another unit" if count > 1 else "its decimal point elsewhere"
     message = (
         f"{place(channel, first, line_of)} is {value:.6g} {unit}{more}: {factor:.4g} times what the other rows suggest; "
-        f"{'are these rows in' if rows.size > 1 else 'has this number'} {question}? Correct the file; to use the values as "
+        f"{'are these rows in' if count > 1 else 'has this number'} {question}? Correct the file; to use the values as "
         f"they are, add missing={NO_MISSING}"
     )
     raise InvalidError.of(message, code="mixed_units", pointer=f"/channels/{channel}/{first}", row=first + 1)
@@ -86,7 +89,8 @@ def _by_friction(pressure: FloatArray, speed: FloatArray, torque: FloatArray, *,
                 continue
             for factor in (*_UNITS[channel], *(() if sampled else _POINTS)):
                 right = float(np.median(ratio[rows])) / factor**power / usual
-                if 1 / _NEAR < right < _NEAR and low / _OUTSIDE <= value / factor <= high * _OUTSIDE:
+                reach = _OUTSIDE if rows.size < _MIN_SAMPLES else _OFF  # a level may be the highest
+                if 1 / _NEAR < right < _NEAR and low / reach <= value / factor <= high * reach:
                     return channel, rows, factor
     return None
 

@@ -231,14 +231,11 @@ def _settled(
     rivals = [at for at in rivals if table.columns[at].unit is not None] or rivals
     if len(rivals) < 2:
         return (rivals[0], best) if rivals else (None, 1.0)
-    torque = next(
-        (
-            at
-            for at, column in enumerate(table.columns)
-            if mapping.get("torque_nm") and _address(table, at) == mapping["torque_nm"].column
-        ),
-        None,
+    chosen_torque = mapping.get("torque_nm")
+    of_torque = (
+        at for at in range(len(table.columns)) if chosen_torque and _address(table, at) == chosen_torque.column
     )
+    torque = next(of_torque, None)
     # read together: the last row may be cut in one of them
     asked = dict.fromkeys(rivals, channel) | ({} if torque is None else {torque: "torque_nm"})
     cells = read_cells(table, asked, reading)
@@ -318,13 +315,7 @@ def _likelihood(column: FileColumn, channel: str) -> float:
 def _ends_in_another_unit(channel: str, name: str) -> bool:
     """Whether a name's last word is a unit of another quantity (`Axial_Force_kN`)."""
     *others, last = re.split(r"[\s_]+", name.strip())
-    return bool(others) and is_unit(last) and _unit_at_the_end(channel, name) is None
-
-
-def _unit_at_the_end(channel: str, name: str) -> str | None:
-    """The channel's unit in the last word of a name, ignoring case (`pressure_mpa`)."""
-    *others, last = re.split(r"[\s_]+", name.strip())
-    return next((unit for unit in (last, last.upper()) if others and conversion(channel, unit)), None)
+    return bool(others) and is_unit(last) and not (conversion(channel, last) or conversion(channel, last.upper()))
 
 
 def _best(scores: Mapping[int, float]) -> tuple[int | None, float]:
@@ -343,8 +334,6 @@ def _choice(table: Table, at: int, channel: str, reading: Reading) -> tuple[Colu
         return ColumnChoice(column=title), 1.0
     if channel == "time_s" and any(is_stamp(row[at]) for row in table.head[:1] if len(row) > at):
         return ColumnChoice(column=title), 1.0
-    if unit := _unit_at_the_end(channel, column.name):
-        return ColumnChoice(column=title, unit=unit), _UNIT_BY_SIZE
     values = plain(read_cells(table, {at: channel}, reading)[at])
     return ColumnChoice(column=title, unit=_unit_by_size(channel, values)), _UNIT_BY_SIZE
 

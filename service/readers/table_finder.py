@@ -400,9 +400,11 @@ def _layout(
             continue
         for titles in _titles(rows, above[place:], width, data):
             filled = sum(map(bool, titles))
-            with_units = _beside_units(titles, rows[at + 1])
+            with_units = _beside_units(titles, rows[at + 1], rows[at - 1] if at else ())
             channel_count = 0 if _are_units(titles) else recognised(with_units, named)  # `rpm` is both
-            enough = filled >= width if at in comments else filled >= min(2, width) or channel_count
+            enough = (
+                filled + (titles[:1] == [""]) >= width if at in comments else filled >= min(2, width) or channel_count
+            )
             rank = (
                 channel_count,
                 -abs(len(titles) - width) - LONGEST_TITLE * (max(map(len, titles), default=0) > LONGEST_TITLE),
@@ -420,8 +422,10 @@ def _layout(
     rank, titles, at = best
     units = [] if at == crossing else _units(rows, [row for row in above if row > at], at, start, titles, width)
     twice = len(set(filter(None, titles))) < sum(map(bool, titles))
-    over_groups = at > 0 and (
-        at - 1 in above or (twice and not all(NUMBER.fullmatch(_text(cell)) for cell in rows[at - 1] if cell))
+    over_groups = (
+        at > 0
+        and not _are_units(rows[at - 1])
+        and (at - 1 in above or (twice and not all(NUMBER.fullmatch(_text(cell)) for cell in rows[at - 1] if cell)))
     )
     groups = _filled([_text(cell) for cell in rows[at - 1]], len(titles)) if over_groups else []
     extra_rows = (units[: len(titles)], groups if twice else (), rows[start][: len(titles)])
@@ -431,14 +435,13 @@ def _layout(
     return Layout(headings=headings, titles=at, start=start, labelled=labelled, score=score)
 
 
-def _beside_units(titles: Sequence[str], below: Row) -> Sequence[str]:
-    """Titles with the units of the row below them, if all that stands there are units."""
-    if not _are_units(below):
-        return titles
-    pairs = zip_longest(titles, map(_text, below[: len(titles)]), fillvalue="")
+def _beside_units(titles: Sequence[str], *beside: Row) -> Sequence[str]:
+    """Titles with the units of the first row beside them that holds nothing else."""
+    row = next(filter(_are_units, beside), ())
+    pairs = zip_longest(titles, map(_text, row[: len(titles)]), fillvalue="")
+    stated = [bool(title and is_unit(bare_unit(unit) or "") and not _BRACKETS.search(title)) for title, unit in pairs]
     return [
-        f"{title} [{unit}]" if title and bare_unit(unit) and not _BRACKETS.search(title) else title
-        for title, unit in pairs
+        f"{title} [{row[at]}]" if own else title for at, (title, own) in enumerate(zip(titles, stated, strict=True))
     ]
 
 
@@ -532,9 +535,9 @@ def _text(cell: Any) -> str:
 
 
 def _are_units(row: Row) -> bool:
-    """Whether all texts are units, with or without a word above that says so."""
-    labelled = bool(row) and _UNIT_LABELS.fullmatch(_text(row[0])) is not None
-    stated = [unit for unit in map(bare_unit, map(_text, row[labelled:])) if unit]
+    """Whether all texts are units, with or without words that say so."""
+    texts = (text for text in map(_text, row) if not _UNIT_LABELS.fullmatch(text))
+    stated = [unit for unit in map(bare_unit, texts) if unit]
     return bool(stated) and all(map(is_unit, stated))
 
 

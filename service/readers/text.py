@@ -298,7 +298,7 @@ def _rows(lines: Sequence[str], separator: str, skipped: int = 0) -> Iterator[tu
     for index, line in numbered:
         if index < skipped or _SEPARATOR_LINE.fullmatch(line):
             continue
-        if '"' in line and separator.strip() and line.count('"') == len(_DITTO.findall(line)):
+        if '"' in line and separator.strip(" ") and line.count('"') == len(_DITTO.findall(line)):
             line = _DITTO.sub('""""', line)
         while '"' in line and separator.strip() and _is_open(line) and line.count("\n") < _MAX_CELL_LINES:
             line += "\n" + next(numbered, (0, '"'))[1]

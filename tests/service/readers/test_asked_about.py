@@ -213,6 +213,41 @@ def test_a_list_of_channels_above_names_the_columns(tmp_path: Path) -> None:
     assert read_file(tmp_path / "a.csv", filename="a.csv").columns["speed_rpm"].tolist() == N
 
 
+def test_a_title_of_numbers_that_is_a_sharp_begins_no_comment(tmp_path: Path) -> None:
+    (tmp_path / "a.tsv").write_text("#\tp (bar)\tn (rpm)\tM (Nm)\n" + rows(NUMBERED, P, N, M, separator="\t"))
+    assert read_file(tmp_path / "a.tsv", filename="a.tsv").columns["torque_nm"].tolist() == M
+
+
+def test_units_may_stand_above_titles_beside_their_label(tmp_path: Path) -> None:
+    """As TwinCAT's scope writes them, with a time before each channel."""
+    text = "Unit\tbar\tUnit\trpm\tUnit\tNm\nTime [ms]\tfPressure\tTime [ms]\tfSpeed\tTime [ms]\tfTorque\n"
+    times = [10 * k for k in range(12)]
+    (tmp_path / "a.csv").write_text(text + rows(times, P, times, N, times, M, separator="\t"))
+    suggestion = suggested(tmp_path / "a.csv", "dynamic_stribeck")
+    assert [suggestion.map[name] for name in STACKED] == ["fPressure", "fSpeed", "fTorque"]
+
+
+def test_of_several_times_in_a_long_table_those_that_stand_are_none(tmp_path: Path) -> None:
+    """As InfluxDB writes the range that was asked for beside each time."""
+    lines = ["_start,_time,_value,_field"]
+    for name, values in zip(("pressure_bar", "speed_rpm", "torque_nm"), (P, N, M), strict=True):
+        lines += [f"2026-03-12T00:00:00Z,2026-03-12T07:00:{k:02}Z,{value},{name}" for k, value in enumerate(values)]
+    (tmp_path / "a.csv").write_text("\n".join(lines) + "\n")
+    columns = read_file(tmp_path / "a.csv", filename="a.csv").columns
+    assert columns["time_s"].tolist() == list(range(12))
+    assert columns["torque_nm"].tolist() == M
+
+
+def test_of_several_times_in_a_long_table_that_go_on_none_is_chosen(tmp_path: Path) -> None:
+    """A clock of whole seconds stands for as many rows as are looked at first."""
+    lines = ["time_s,timestamp,value,field"]
+    for k in range(60):
+        lines += [f"{k / 20},2026-03-12T07:00:{k // 20:02}Z,{20 + k % 7},torque_nm"]
+    (tmp_path / "a.csv").write_text("\n".join(lines) + "\n")
+    with pytest.raises(InvalidError, match="time_s must be one column"):
+        read_file(tmp_path / "a.csv", filename="a.csv")
+
+
 def test_a_point_in_cells_that_commas_separate_is_the_decimal_sign(tmp_path: Path) -> None:
     text = TITLES.replace(";", ",") + rows(P, [f"{n / 1000:.3f}" for n in N], M, separator=",")
     (tmp_path / "a.csv").write_text(text.replace("1/min", "krpm"))

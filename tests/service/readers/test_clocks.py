@@ -185,3 +185,13 @@ def test_a_start_among_the_properties_of_a_channel_of_tdms_is_used(tmp_path: Pat
             ]
         )
     assert_together(read(tmp_path / "a.tdms"))
+
+
+def test_the_unit_beside_values_and_their_times_is_that_of_the_values(tmp_path: Path) -> None:
+    """A struct of `time`, `data` and `unit`, as Simulink logs signals."""
+    signals = {"torque": (TORQUE, "Nm"), "speed": (SPEED, "rpm"), "pressure": (PRESSURE, "bar")}
+    held = {name: {"time_s": TIME, "data": values, "unit": unit} for name, (values, unit) in signals.items()}
+    scipy.io.savemat(tmp_path / "a.mat", held)
+    columns = read_file(tmp_path / "a.mat", filename="a.mat").columns
+    np.testing.assert_allclose(columns["time_s"], TIME)
+    np.testing.assert_allclose(columns["torque_nm"], TORQUE)
