@@ -33,7 +33,7 @@
 #              minutes, on a machine that does nothing else
 # make scale    requests and commands with 1,000 clutches of 200 tests in one file, beside 10, and with a life of 1,000 tests,
 #              beside 100: tables of docs/appendix/scale.md; fails where the long life costs more than is wanted
-#              (ARGS="--clutches 10000 --states 5"); needs 7 GB of disk. python -m tests.scale.replay --clutches 300: a replay
+#              (ARGS="--clutches 10000 --states 5"); needs 7 GB of disk. python -m tests.lab.scale.replay --clutches 300: a replay
 #              in one process, in a pool and on a Dask cluster of which a worker is killed
 # make plausibility  sends mistyped and honest runs: the tables of docs/appendix/plausibility.md; STORE=FILE goes on where it
 #              ended                                    (SEED= CAMPAIGNS= HONEST= LIVES= ABLATED= ARGS=--write)
@@ -127,29 +127,29 @@ lowest: $(VENV)-lowest/.tests
 	sha256sum tests/requirements-lowest.txt > tests/lowest.tried
 
 picture: $(VENV)/.tests
-	$(BIN)/python -m tests.pictures
+	$(BIN)/python -m tests.lab.pictures
 
 benchmark: $(VENV)/.tests
-	$(BIN)/python -m tests.benchmarks $(ARGS)
+	$(BIN)/python -m tests.lab.benchmarks $(ARGS)
 
 files: $(VENV)/.tests
 	$(BIN)/python -W ignore -m tests.lab.files $(ARGS)
 
 bench: $(VENV)/.tests
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.benchmarks.ratios $(ARGS)
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.lab.benchmarks.ratios $(ARGS)
 
 load: $(VENV)/.tests
-	$(BIN)/python -m tests.load $(ARGS)
+	$(BIN)/python -m tests.lab.load $(ARGS)
 
 scale: $(VENV)/.tests
-	$(BIN)/python -m tests.scale $(ARGS)
-	$(BIN)/python -m tests.scale.long_life
+	$(BIN)/python -m tests.lab.scale $(ARGS)
+	$(BIN)/python -m tests.lab.scale.long_life
 
 real: $(VENV)/.tests
-	$(BIN)/python -m tests.real $(ARGS)
+	$(BIN)/python -m tests.lab.real $(ARGS)
 
 figures: $(VENV)/.tests
-	$(BIN)/python -m tests.figures
+	$(BIN)/python -m tests.lab.figures
 
 docs: $(VENV)-docs/.ready $(VENV)/.runs
 	$(BIN)/python -m tests.documents made
@@ -174,29 +174,29 @@ law_adoption: $(VENV)/.tests
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.lab.law.adoption $(ARGS)
 
 blind: $(VENV)/.tests
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.blind$(if $(ABLATE),.ablations,$(if $(SUBSET),.subset)) $(ARGS)
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.lab.blind$(if $(ABLATE),.ablations,$(if $(SUBSET),.subset)) $(ARGS)
 
 oracle: $(VENV)/.tests
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.blind.oracle $(ARGS)
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.lab.blind.oracle $(ARGS)
 
 visible: $(VENV)/.tests
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.visible
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.lab.visible
 
 mutants: $(VENV)/.tests
-	$(BIN)/python -m tests.mutants
+	$(BIN)/python -m tests.lab.mutants
 
 adoption: $(VENV)/.tests
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.adoption $(ARGS)
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.lab.adoption $(ARGS)
 
 plausibility: $(VENV)/.tests
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.plausibility $(ARGS)
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.lab.plausibility $(ARGS)
 
 score: $(VENV)/.tests
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.score $(ARGS)
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.lab.score $(ARGS)
 
 rivals: $(VENV)-rivals/.ready
-	OPENBLAS_NUM_THREADS=1 $(VENV)-rivals/bin/python -m tests.rivals.laws $(ARGS)
-	OPENBLAS_NUM_THREADS=1 $(VENV)-rivals/bin/python -m tests.rivals $(ARGS)
+	OPENBLAS_NUM_THREADS=1 $(VENV)-rivals/bin/python -m tests.lab.rivals.laws $(ARGS)
+	OPENBLAS_NUM_THREADS=1 $(VENV)-rivals/bin/python -m tests.lab.rivals $(ARGS)
 
 $(VENV)-rivals/.ready: pyproject.toml | $(VENV)/.python
 	$(PYTHON) -m venv $(VENV)-rivals

@@ -2,7 +2,7 @@
 
 from tests.architecture import document, picture
 from tests.documents import reference
-from tests.measuring import fill
+from tests.lab.measuring import fill
 
 if __name__ == "__main__":
     picture.main()

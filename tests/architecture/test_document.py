@@ -6,7 +6,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from tests.architecture import document, picture, rooms
-from tests.measuring import filled, parts
+from tests.lab.measuring import filled, parts
 
 PARTS = parts(document.DOCUMENT.read_text(encoding="utf-8"))
 AGAIN = "write it again: make architecture"

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from service.cli.main import app
-from tests.measuring import ROOT, blocks
+from tests.lab.measuring import ROOT, blocks
 from tests.support import serving
 
 PAGE = ROOT / "docs" / "gallery.md"

@@ -23,8 +23,8 @@ from service.cli import main as command_line
 from service.settings import PREFIX, Settings
 from service.web.metrics import Metrics
 from storage.engine.opening import open_database
-from tests import measuring
-from tests.measuring import ROOT
+from tests.lab import measuring
+from tests.lab.measuring import ROOT
 
 FOLDER = ROOT / "docs" / "reference"
 OUT_OF_GIT = ("codes.md", "commands.md", "fields.md", "routes.md")

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from tests.documents import gallery
-from tests.measuring import ROOT, blocks
+from tests.lab.measuring import ROOT, blocks
 from tests.support import serving
 
 DOCS = ROOT / "docs"

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.measuring import ROOT
+from tests.lab.measuring import ROOT
 
 DOCS = ROOT / "docs"
 #: Words in a sentence; guides to plain English say 20 on average and 40 at most.

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.measuring import ROOT, blocks
+from tests.lab.measuring import ROOT, blocks
 from tests.support import Server
 
 DOCUMENTS = sorted([ROOT / "README.md", *(ROOT / "docs").rglob("*.md")])

@@ -14,7 +14,7 @@ import pandas as pd
 import pytest
 
 from service.client.clutchlife import Client
-from tests.measuring import ROOT, blocks
+from tests.lab.measuring import ROOT, blocks
 from tests.support import Server
 
 PAGE = ROOT / "docs" / "how-to" / "scripts.md"

@@ -14,7 +14,7 @@ from typing import Any
 import httpx2
 import pytest
 
-from tests.benchmarks.memory import family, resident
+from tests.lab.benchmarks.memory import family, resident
 from tests.service.changes import stand_in_engine
 from tests.service.jobs.waiting import until
 from tests.storage.engine.postgresql.server import PostgresServer

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from models.tracking.prior import TrackPrior
-from tests.score.off_prior import stated
+from tests.lab.score.off_prior import stated
 from tests.statistical.lives import PRIOR
 
 pytestmark = pytest.mark.slow

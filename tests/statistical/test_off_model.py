@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.score.off_prior import rig_lives
+from tests.lab.score.off_prior import rig_lives
 from tests.statistical.forecasts import LAWS, STAGES, followed
 
 pytestmark = pytest.mark.slow

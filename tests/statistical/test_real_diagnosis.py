@@ -13,7 +13,7 @@ from models.diagnosis.explanations.evidence import projections_beside
 from models.diagnosis.explanations.verdict import Verdict
 from models.diagnosis.pooled_fit.baseline_fit import fit_baseline
 from models.diagnosis.pooled_fit.projection import gram_of
-from tests.real import diagnosis, loaders
+from tests.lab.real import diagnosis, loaders
 
 pytestmark = [
     pytest.mark.slow,

@@ -16,8 +16,8 @@ from models.tracking.filters.ukf import Ukf
 from models.tracking.measurement import Measurement
 from models.tracking.posterior import TrackPosterior
 from models.tracking.prior import TrackPrior, weak
+from tests.lab.score.table import Scores
 from tests.models.tracking.tracked_series import followed, sent
-from tests.score.table import Scores
 from tests.statistical.lives import (
     LEVELS,
     PRIOR,

@@ -251,7 +251,7 @@ UNSETTLED_DWELL = Effect(
     repair="hold each speed longer before it is read",
     formula="a (x_before - S), x = S + k a (x_before - S) what a plateau ends with; a = e^{-dwell/τ} averaged over what was "
     "read",
-    source="Ompusunggu et al. 2013, section 2.3.3: 5 s a plateau; real transients in tests/real",
+    source="Ompusunggu et al. 2013, section 2.3.3: 5 s a plateau; real transients in tests/lab/real",
     kind=EffectKind.ARTEFACT,
     amplitude="share of the previous plateau",
     states="A reading still contains {} of the previous plateau.",

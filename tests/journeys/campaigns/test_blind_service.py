@@ -5,8 +5,8 @@ from typing import Any
 import httpx2
 import pytest
 
-from tests.blind.rig.hide import Hidden, hide
-from tests.blind.rig.sent import runs
+from tests.lab.blind.rig.hide import Hidden, hide
+from tests.lab.blind.rig.sent import runs
 
 VERDICTS = {"model_adequate", "cause_named", "cause_ambiguous", "unexplained_structure", "insufficient_data"}
 BASE = "/v1/clutches/blind"

@@ -3,7 +3,7 @@
 import httpx2
 import pytest
 
-from tests.real import loaders
+from tests.lab.real import loaders
 
 pytestmark = pytest.mark.skipif(not loaders.FOLDER.is_dir(), reason=f"the measurements are not at {loaders.FOLDER}")
 

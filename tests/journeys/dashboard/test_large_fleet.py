@@ -9,7 +9,7 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from tests.browser.driving import Watched
-from tests.scale.copies import life, multiply, name
+from tests.lab.scale.copies import life, multiply, name
 from tests.support import Server, serving, stationary
 
 pytestmark = pytest.mark.browser

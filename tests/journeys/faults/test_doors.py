@@ -22,8 +22,8 @@ import pytest
 from service.alarms.outbox import CLOCK_SECONDS
 from service.api.base import MAX_POINTS
 from service.web.limits import TAKEN_SECONDS
-from tests.benchmarks.memory import processor_seconds, resident
-from tests.load.bodies import long_file
+from tests.lab.benchmarks.memory import processor_seconds, resident
+from tests.lab.load.bodies import long_file
 from tests.service.alarms.receiving import SECRET, receiving
 from tests.service.jobs.waiting import until
 from tests.service.web.routes.surfaces import png

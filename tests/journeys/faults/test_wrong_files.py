@@ -16,7 +16,7 @@ import httpx2
 import numpy as np
 import pytest
 
-from tests.benchmarks.memory import added
+from tests.lab.benchmarks.memory import added
 from tests.service.readers.sample_files import UNITS, csv_text, record, write_mdf, write_parquet, write_tdms
 from tests.support import ONCE, Server, serving, stationary
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from tests.lab.files.draw import Verdict, judged
 from tests.lab.files.writers import drawn
-from tests.measuring import show
+from tests.lab.measuring import show
 
 _VERDICTS = [verdict.value for verdict in Verdict]
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from models.prognosis.scoring import covered
-from tests.adoption.trials import asked
+from tests.lab.adoption.trials import asked
 from tests.lab.law.kinds import tabulate
 from tests.lab.law.worlds import sent_of_curves
 from tests.service.clients import client_on

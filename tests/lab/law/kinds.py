@@ -7,7 +7,7 @@ from functools import partial
 from typing import Protocol, TypeVar
 
 from tests.lab.law.worlds import FORMULAS, measured
-from tests.measuring import Asked, Lines, each, publish, table, where
+from tests.lab.measuring import Asked, Lines, each, publish, table, where
 
 
 class OfCampaign(Protocol):

@@ -22,10 +22,10 @@ from models.diagnosis.campaign import Campaign
 from service.api.clutch import ClutchIn
 from service.clutch.diagnosis.campaign import campaign_of, run_of
 from service.runs.json_run import read_run
-from tests.blind.rig import clutch as rig
-from tests.blind.rig.hide import hide
-from tests.blind.rig.sent import campaign
-from tests.measuring import ROOT
+from tests.lab.blind.rig import clutch as rig
+from tests.lab.blind.rig.hide import hide
+from tests.lab.blind.rig.sent import campaign
+from tests.lab.measuring import ROOT
 
 CURVES = Path("data/real_friction_curves/real_curves.py")
 #: e^{-1/u} = 1/2 at u = 1.44: each form has fallen by half at the speed at which eq. 3 has.

@@ -6,7 +6,7 @@ Writes them into the document, between their marks.
 from models.diagnosis.effects.catalogue import CATALOGUE
 from models.diagnosis.effects.effect import EffectKind
 from models.diagnosis.experiments.candidates import TRIALS
-from tests.measuring import APPENDIX, fill, table
+from tests.lab.measuring import APPENDIX, fill, table
 
 #: What an adopted effect does, by its kind.
 ADOPTED = {

@@ -13,8 +13,8 @@ from models.loops.loop_area import Direction, area_of, clean_samples
 from models.loops.loops import evaluate_loops
 from models.records.periods import fit_cycle
 from models.records.runs import Record
+from tests.lab.real.lag import MICRO_LOOPS, micro_loops
 from tests.models.loops.dynamic_records import FALLING, GEOMETRY, SWING, attractor, curve, record, velocity
-from tests.real.lag import MICRO_LOOPS, micro_loops
 
 AMPLITUDE = GEOMETRY.mean_radius * SWING
 EXACT = StationaryCurve(parameters=FALLING)

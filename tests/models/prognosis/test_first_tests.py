@@ -16,8 +16,8 @@ from models.tracking.filters.particle import Particle
 from models.tracking.filters.ukf import Ukf
 from models.tracking.measurement import Measurement
 from models.tracking.prior import weak
+from tests.lab.score.starts import bounds, real_starts, safe_bound, simulated_starts
 from tests.models.tracking.tracked_series import NAMES, followed, sent
-from tests.score.starts import bounds, real_starts, safe_bound, simulated_starts
 
 
 def measured(cycles: np.ndarray, share_of_new: np.ndarray) -> list[Measurement]:

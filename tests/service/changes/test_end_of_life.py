@@ -12,7 +12,7 @@ from fastapi.testclient import TestClient
 
 from service.changes.learn_fleet import refresh
 from storage.engine.opening import open_database
-from tests.real import loaders
+from tests.lab.real import loaders
 from tests.service.clients import filled_client
 from tests.service.jobs.replaying import InThread
 from tests.service.jobs.waiting import until

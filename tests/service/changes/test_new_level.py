@@ -10,7 +10,7 @@ from fastapi.testclient import TestClient
 from models.plausibility import criteria
 from service.answers.verification import check_results
 from storage.engine.opening import open_database
-from tests.plausibility.bench import with_gain
+from tests.lab.plausibility.bench import with_gain
 from tests.service.clients import post_run
 from tests.support import one_quick, stationary
 

@@ -8,7 +8,7 @@ from models.degradation.severity import Block
 from service.clutch.items import date_notice
 from service.clutch.notices import history_warnings
 from service.clutch.timeline import Event, Life, moment_at, moment_of, pace_of
-from tests.plausibility.bench import Bench
+from tests.lab.plausibility.bench import Bench
 from tests.support import stationary
 
 RECEIVED = "2026-11-29T12:00:00+00:00"

@@ -29,10 +29,10 @@ from service.clutch.quantities.items import track_item
 from service.clutch.quantities.measured import QUANTITIES, parameter_tracks, posterior_of, pressure_level
 from service.clutch.timeline import Event, Life, Series, lives_of
 from service.clutch.tracking import METHODS, PREDICTED, advance, drawn, end_of_life, predict
+from tests.lab.plausibility.bench import Bench
+from tests.lab.score.paper import PLACE, measured_life
 from tests.models.prognosis.test_course_shares import accelerating
 from tests.models.tracking.tracked_series import CAMPAIGN
-from tests.plausibility.bench import Bench
-from tests.score.paper import PLACE, measured_life
 from tests.service.clients import as_answered, post_run
 from tests.support import stationary
 

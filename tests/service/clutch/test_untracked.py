@@ -15,7 +15,7 @@ from service.clutch.assumptions import Assumptions, ModelInForce
 from service.clutch.model_correction import corrected_cofs
 from service.clutch.timeline import Event, Life
 from storage.engine.opening import open_database
-from tests.plausibility.bench import with_gain
+from tests.lab.plausibility.bench import with_gain
 from tests.service.changes.benches import without_revision
 from tests.service.clients import client_of, post_run
 from tests.service.clutch.diagnosis.test_campaign import campaign, idle_record, post

@@ -18,7 +18,7 @@ from service.web import auth, responses
 from storage.engine.errors import DatabaseBusy
 from storage.engine.opening import open_database
 from storage.engine.sqlite.database import back_up
-from tests.benchmarks.memory import resident
+from tests.lab.benchmarks.memory import resident
 from tests.service.clients import client_on
 from tests.service.jobs.replaying import replay_clutch
 from tests.service.web.routes.granting import granted, revoke_all

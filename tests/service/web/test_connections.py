@@ -15,7 +15,7 @@ from uvicorn.config import Config
 from uvicorn.server import ServerState
 
 from service.web.connections import bounded
-from tests.benchmarks.memory import resident
+from tests.lab.benchmarks.memory import resident
 from tests.support import ONCE, serving, stationary
 
 BEGUN = b"GET /livez HTTP/1.1\r\nHost: 127.0.0.1\r\nX-Slow: a"

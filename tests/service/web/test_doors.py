@@ -30,7 +30,7 @@ from service.web.files import Copies, emptied_folder
 from service.web.middleware import Answers
 from service.web.routes import inspections, rigs, runs
 from storage.encoding import to_text
-from tests.benchmarks.memory import family, resident
+from tests.lab.benchmarks.memory import family, resident
 from tests.service.clients import client_on, csv_text
 from tests.service.jobs.waiting import until
 from tests.service.web.routes.granting import context_of

@@ -11,7 +11,7 @@ from pathlib import Path
 import httpx2
 import pytest
 
-from tests.benchmarks.memory import family
+from tests.lab.benchmarks.memory import family
 from tests.support import ONCE, Server, stationary
 
 RUNS = "/v1/clutches/c{}/runs"

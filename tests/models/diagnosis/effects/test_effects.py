@@ -30,7 +30,7 @@ from models.diagnosis.noise.estimate import estimate_noise, first_noise
 from models.diagnosis.pooled_fit.baseline_fit import fit_baseline
 from models.diagnosis.pooled_fit.gauss_newton import fit
 from models.diagnosis.pooled_fit.projection import gram_of, project
-from tests.measuring import APPENDIX, parts
+from tests.lab.measuring import APPENDIX, parts
 from tests.models.diagnosis.campaigns import Study, campaign, of_size, scene_of, study
 from tests.models.diagnosis.tables import TABLES
 

@@ -15,8 +15,8 @@ from models.diagnosis.explanations.shapeless import outlying_run, temperature_ev
 from models.diagnosis.explanations.verdict import NOTHING, UNCATALOGUED, Alternative, Explanation, Verdict
 from models.diagnosis.pooled_fit.baseline_fit import Baseline
 from models.diagnosis.raw_records.evidence import FIXED_LINE, RawEvidence
-from tests.blind.rig.hide import hide
-from tests.blind.rig.sent import campaign as sent
+from tests.lab.blind.rig.hide import hide
+from tests.lab.blind.rig.sent import campaign as sent
 from tests.models.diagnosis.campaigns import Where, altered, campaign, look, rehearsal, study, warmth
 from tests.models.diagnosis.test_diagnose import PLANTED, warm
 

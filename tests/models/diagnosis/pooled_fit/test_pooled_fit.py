@@ -15,8 +15,8 @@ from models.diagnosis.effects.thermal import AT_ONCE
 from models.diagnosis.pooled_fit.baseline_fit import fit_baseline
 from models.diagnosis.pooled_fit.gauss_newton import REFIT_STEPS, FitStatus, PooledFit, fit, prior_gram, refit
 from models.diagnosis.pooled_fit.projection import RunScatter, gram_of, law_torque, projections_of, run_scatter
-from tests.blind.rig.hide import hide
-from tests.blind.rig.sent import campaign as sent
+from tests.lab.blind.rig.hide import hide
+from tests.lab.blind.rig.sent import campaign as sent
 from tests.models.diagnosis.campaigns import Study, campaign, of_size, rehearsal, start_of, study
 from tests.support import one_quick
 

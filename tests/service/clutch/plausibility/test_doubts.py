@@ -8,8 +8,8 @@ import pytest
 
 from service.clutch.plausibility.doubts import Judged, doubts_together
 from service.clutch.timeline import Event, Shown
-from tests.plausibility import simulated, slips, trials
-from tests.plausibility.bench import REFUSED, Bench, Body, with_gain
+from tests.lab.plausibility import simulated, slips, trials
+from tests.lab.plausibility.bench import REFUSED, Bench, Body, with_gain
 from tests.support import stationary
 
 CYCLES = (0, 500, 1000, 2000, 3000, 4000, 5000, 6000)

@@ -15,7 +15,7 @@ from fastapi.testclient import TestClient
 
 from service.web import readiness
 from service.web.readiness import available_memory
-from tests.benchmarks.memory import family
+from tests.lab.benchmarks.memory import family
 from tests.service.clients import client_on
 from tests.service.jobs.waiting import until
 from tests.service.web.routes.granting import context_of
