@@ -285,10 +285,10 @@ def _with_definitions(rows: Sequence[Row]) -> Sequence[Row]:
     """The rows with titles and units of a channel list above them (`CH1;Torque;...;Nm`) in place of their numbers."""
     defined: dict[str, str] = {}
     for row in rows:
-        channel, *cells = map(_text, row) if len(row) > 2 else [""]
+        channel, *cells = map(_text, row if len(row) > 2 and not is_value(row[0]) else [""])
         unit = next((cell for cell in reversed(cells) if is_unit(cell)), "")
         name = next((cell for cell in cells if cell and known_channel(cell[:LONGEST_TITLE]) and not is_unit(cell)), "")
-        if channel and name and unit and not known_channel(channel[:LONGEST_TITLE]) and not is_value(channel):
+        if channel and name and unit and not known_channel(channel[:LONGEST_TITLE]):
             defined[channel] = f"{name} [{unit}]"
     if len(defined) < 2:
         return rows

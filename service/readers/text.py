@@ -317,7 +317,7 @@ def _is_comment(line: str, separator: str) -> bool:
 
 def _is_open(text: str) -> bool:
     """Whether a text ends within a cell in quotes."""
-    return text.count('"') % 2 == 1 and _OPEN.fullmatch(text) is not None
+    return '"' in text and text.count('"') % 2 == 1 and _OPEN.fullmatch(text) is not None
 
 
 def _cells(line: str, separator: str) -> list[str]:
