@@ -124,6 +124,7 @@ def create_app(settings: Settings) -> FastAPI:
     routers = [part.router for part in (health, clutches, runs, inspections, life, diagnoses, jobs)]
     routers += [clutches.fleet_router, rigs.router, alarms.router, clutches.totals_router, exports.router]
     routers += [exports.fleet_router, health.description_router, rigs.import_router, alarms.webhook_router]
+    routers += [runs.doubt_router]
     routers += [dashboard.router(assets.load()), site.router()]
     for router in routers:
         app.include_router(router)

@@ -23,12 +23,26 @@ class FieldError:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Hypothesis:
+    """One cause of several held runs: its name and kind, the runs, and the correction of their cycles that it proposes, an
+    offset or a factor (None: neither)."""
+
+    name: str
+    kind: str
+    runs: tuple[str, ...]
+    cycles_offset: float | None = None
+    cycles_factor: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Notice:
-    """A warning that did not stop the run; a doubt has the cycles that it concerns."""
+    """A warning that did not stop the run; a doubt has the cycles that it concerns, and one about several runs their
+    common cause."""
 
     code: str
     message: str
     likely_cycles: float | None = None
+    hypothesis: Hypothesis | None = None
 
 
 class ServiceError(Exception):

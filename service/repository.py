@@ -268,6 +268,18 @@ def _store_judged(connection: Connection, clutch_id: str, judged: Judged, *, at:
         )
         entry = {"run_id": event.run_id, "at": at, "by": BY_EVIDENCE, "reason": judged.reasons[event.run_id]}
         changes.insert(connection, clutch_id, action, summary(row), summary(after), revision=revision, **entry)
+    for run_id, notices in judged.doubts.items():  # the question to several held runs names all of them
+        held = runs.get(connection, clutch_id, run_id) if any(notice.hypothesis for notice in notices) else None
+        doubts = tuple(doubted(notices))
+        if held is not None and held.state == runs.HELD and list(held.doubts) != list(doubts):
+            runs.set_state(
+                connection,
+                held.run_key,
+                state=runs.HELD,
+                cycles=held.cycles,
+                sent_cycles=held.sent_cycles,
+                doubts=doubts,
+            )
 
 
 def unchanged(connection: Connection, clutch_id: str, revision: int) -> bool:

@@ -130,11 +130,14 @@ def _shown(connection: Connection, rows: Sequence[ClutchRow]) -> list[_Shown]:
 
 def _item(clutch: _Shown) -> ClutchOut:
     row, diagnosis = clutch.row, clutch.diagnosis
+    first_line = repository.first_line(row, diagnosis, raised=len(clutch.alarms))
     return of_row(
         ClutchOut,
         row,
         **repository.record(row).model_dump(mode="json"),
-        **repository.first_line(row, diagnosis, raised=len(clutch.alarms)),
+        **first_line,
+        what_to_do=first_line["action"],
+        open_alarms=len(clutch.alarms),
         state=repository.condition(row),
         runs=row.summary.get("runs", 0),
         recent=row.summary.get("recent"),

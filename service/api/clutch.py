@@ -250,6 +250,8 @@ class ClutchOut(base.Answer):
     runs: int = Field(description="Number of runs that count, without held and withdrawn ones")
     held: int = Field(description="Number of held runs, which wait to be confirmed, corrected or withdrawn")
     alarms: list[EventOut] = Field(description="Its alarms that nobody has acknowledged, newest first")
+    what_to_do: str = Field(description="The same as `action`")
+    open_alarms: int = Field(description="Number of alarms that nobody has acknowledged")
     summary: ClutchSummary | None = Field(description="Health and remaining life; null before the first run")
     recent: Recent | None = Field(description="The recent history; null before the first run")
     diagnosis: LatestDiagnosis | None = Field(description="The newest finished diagnosis; null without one")

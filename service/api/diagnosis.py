@@ -125,7 +125,7 @@ class GainOut(base.Answer):
 class LawBandOut(base.Answer):
     """A range of speeds in which the friction curve differs from eq. 3."""
 
-    axis: Literal["speed_rpm"] = Field(description="The channel")
+    axis: Literal["speed"] = Field(description="The channel")
     from_rpm: float = Field(description="Its lowest speed, rpm")
     to_rpm: float = Field(description="Its highest speed, rpm")
     share: float = Field(description="Its share of the squared difference, 0 to 1")

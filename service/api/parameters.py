@@ -21,6 +21,7 @@ SHORT = BeforeValidator(_short)
 
 ClutchId = Annotated[str, Field(description="The clutch's name")]
 RunId = Annotated[str, Field(description="The run's name")]
+DoubtId = Annotated[str, Field(description="The doubt's name, `id` in a held run's `doubts`")]
 DiagnosisId = Annotated[str, Field(description="The diagnosis' name")]
 JobId = Annotated[str, Field(description="The job's name")]
 OfState = Annotated[JobState | None, Field(description="Only jobs in this state; default: all")]

@@ -175,12 +175,47 @@ class Warned(base.Answer):
     message: str = Field(description="The warning in a sentence")
 
 
+class Proposal(base.Answer):
+    """A correction of cycles: an offset or a factor; empty if the runs have neither in common."""
+
+    cycles_offset: base.Real | None = Field(
+        default=None, description="Cycles to add to those sent; after a second roll-over twice as many"
+    )
+    cycles_factor: base.Real | None = Field(default=None, description="Factor on the cycles sent")
+
+
+class CounterHypothesis(base.Answer):
+    """One cause of several held runs."""
+
+    kind: Literal["restart", "offset", "roll_over", "stuck", "other_clutch", "other_unit"] = Field(
+        description="What happened to the counter of cycles; `other_clutch`: the runs are another clutch's"
+    )
+    runs: list[str] = Field(description="The runs that it explains")
+    proposal: Proposal = Field(description="The correction of their cycles")
+
+
 class Doubt(Warned):
     """Why a run is held."""
 
     likely_cycles: base.Real | None = Field(
         default=None, description="The cycles that the doubt suggests; absent if it suggests none"
     )
+    id: str | None = Field(
+        default=None, description="The doubt's name, to be answered at `/doubts/{id}/answer`; absent for one run alone"
+    )
+    hypothesis: CounterHypothesis | None = Field(
+        default=None, description="The common cause of several held runs; absent for one run alone"
+    )
+
+
+class DoubtAnswer(base.Schema):
+    """An answer to a doubt about several runs."""
+
+    accept: Annotated[bool, Field(strict=True)] = Field(
+        description="Whether the hypothesis is right: its runs get their likely cycles, or are withdrawn if they are "
+        "another clutch's. If not, they are accepted as sent"
+    )
+    reason: base.Reason = Field(default="", description="Why")
 
 
 class Withdrawal(base.Schema):

@@ -42,7 +42,7 @@ from service.clutch.timeline import (
     require_within_ends,
 )
 from service.clutch.with_held import held_summary, summarised
-from service.errors import Notice, NotPossibleNowError
+from service.errors import NotFoundError, Notice, NotPossibleNowError
 from service.runs.upload import file_kind, read_file_run
 from storage import changes, raw_columns, runs
 from storage.engine.database import Database
@@ -124,6 +124,26 @@ def change(
     )
     receipts = {answer.run_id: answer for answer in _change(database, request)}
     return [receipts[run_id] for run_id in names]
+
+
+def answer_doubt(
+    database: Database, clutch_id: str, doubt_id: str, *, accept: bool, reason: str, by: str, at: str
+) -> list[Receipt]:
+    """Settle a doubt about several held runs in one step; returns their receipts. If its hypothesis is accepted, the runs
+    get their likely cycles, or are withdrawn where they are another clutch's; if not, they are accepted as sent.
+
+    Raises NotFoundError if no run is held for this doubt.
+    """
+    with database.reading() as connection:
+        repository.clutch(connection, clutch_id)
+        rows = runs.page(connection, clutch_id, state="held")
+    doubts = {row.run_id: doubt for row in rows for doubt in row.doubts if doubt.get("id") == doubt_id}
+    if not doubts:
+        raise NotFoundError(f"no run of clutch {clutch_id!r} is held for a doubt {doubt_id[:80]!r}")
+    cycles = {run_id: float(doubt["likely_cycles"]) for run_id, doubt in doubts.items() if "likely_cycles" in doubt}
+    settled = (changes.CORRECT if cycles else changes.WITHDRAW) if accept else changes.CONFIRM
+    said = reason or f"the doubt {doubt_id} is {'right' if accept else 'wrong'}"
+    return change(database, clutch_id, list(doubts), action=settled, reason=said, by=by, at=at, cycles=cycles)
 
 
 def read_again(

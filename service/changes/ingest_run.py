@@ -195,7 +195,7 @@ def _computed(
     if doubts and not judged.changes:
         with_held = replace(before, held=(*before.held, event))
         part = held_summary(with_held, before.filters or {}, _evidence(database, with_held, arrival, answer))
-        summary = Results(summary={**before.summary, **part})
+        summary = Results(summary={**before.summary, **part}, judged=judged)
         return _Outcome(
             revision=before.revision,
             receipt=answer,

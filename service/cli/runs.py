@@ -100,9 +100,7 @@ def correct(
     rig: Annotated[str | None, typer.Option(help="Read the run's file again with this rig profile")] = None,
     doubt: Annotated[
         str,
-        typer.Option(
-            help="All runs held for this code, as counter_changed: each at the cycles that its doubt asks about"
-        ),
+        typer.Option(help="All runs held for this code, as counter: each at the cycles that its doubt asks about"),
     ] = "",
 ) -> None:
     """Correct the cycles of a run, or of all runs with one doubt; or read a run's file again with another rig profile."""

@@ -16,7 +16,7 @@ from service.clutch.assumptions import ALL_PRESSURES, MEAN_COF, Assumptions, sev
 from service.clutch.engagements import engagement_item
 from service.clutch.incoming_run import IncomingRun
 from service.clutch.timeline import WORN, ByPressure, Event, is_possible
-from service.errors import Notice
+from service.errors import Hypothesis, Notice
 from service.settings import CODE_VERSION
 
 #: Public name and unit of each Stribeck parameter.
@@ -90,8 +90,16 @@ def doubted(notices: Sequence[Notice]) -> list[dict[str, object]]:
     return [
         {"code": notice.code, "message": notice.message}
         | ({} if notice.likely_cycles is None else {"likely_cycles": whole(notice.likely_cycles)})
+        | ({} if notice.hypothesis is None else _hypothesis(notice.hypothesis))
         for notice in notices
     ]
+
+
+def _hypothesis(hypothesis: Hypothesis) -> dict[str, object]:
+    proposal = {"cycles_offset": hypothesis.cycles_offset, "cycles_factor": hypothesis.cycles_factor}
+    stated = {name: whole(float(value)) for name, value in proposal.items() if value is not None}
+    shown = {"kind": hypothesis.kind, "runs": list(hypothesis.runs), "proposal": stated}
+    return {"id": hypothesis.name, "hypothesis": shown}
 
 
 def warned(notices: Sequence[Notice]) -> list[Warned]:

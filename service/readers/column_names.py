@@ -23,7 +23,7 @@ from service.readers.meanings import (
     of_time,
     words,
 )
-from service.readers.table import CELLS, COLUMNS, NO_TIME, SHEETS, ColumnChoice, FileColumn, Reading
+from service.readers.table import CELLS, COLUMNS, NO_TIME, SHEETS, ColumnChoice, FileColumn, Reading, is_per_column
 from service.readers.unit_table import Conversion, conversion, is_unit, spellings
 
 #: Times whose program writes seconds and no unit: LabVIEW's text files, asammdf's exports, Simulink's.
@@ -173,7 +173,9 @@ def parse_map(mapping: str | None) -> dict[str, ColumnChoice]:
             raise _wrong_map(part, "must be a list such as torque_nm:Mz,pressure_bar:p1")
         if channel not in CHANNELS:
             raise _wrong_map(channel, f"must name channels from {', '.join(CHANNELS)}")
-        if channel in choices:
+        if is_per_column(name) and channel in choices and is_per_column(choices[channel].column):
+            name = f"{choices[channel].column},{name}"
+        elif channel in choices:
             raise _wrong_map(channel, "must name each channel once")
         pseudo = next((own for own in (COLUMNS, SHEETS, CELLS) if name.partition(" ")[0] == own), None)
         choices[channel] = (

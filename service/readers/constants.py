@@ -20,7 +20,17 @@ from service.errors import MAX_QUOTED, InvalidError, Notice
 from service.readers.column_names import choices_of, column_of
 from service.readers.meanings import known_channel
 from service.readers.stated_clocks import in_seconds
-from service.readers.table import CELLS, COLUMNS, SHEETS, ColumnChoice, FileColumn, Reading, Table, labels
+from service.readers.table import (
+    CELLS,
+    COLUMNS,
+    SHEETS,
+    ColumnChoice,
+    FileColumn,
+    Reading,
+    Table,
+    is_per_column,
+    labels,
+)
 from service.readers.unit_table import conversion, spellings
 
 _NEEDED = {"torque_nm", "speed_rpm", "pressure_bar"}
@@ -209,11 +219,15 @@ def stacked_columns(table: Table, reading: Reading) -> Table:
 
     Raises InvalidError if the titles state no values, or not the same columns for each.
     """
-    channel = next((name for name, choice in reading.mapping.items() if choice.column == COLUMNS), None)
+    mapping = reading.mapping
+    channel = next((name for name in mapping if (own := mapping[name].column) == COLUMNS or is_per_column(own)), None)
     if channel is None:
         return table
-    unit = reading.mapping[channel].unit
-    stated = [value_of_column(column, channel, unit) if column.title else None for column in table.columns]
+    unit = mapping[channel].unit
+    if mapping[channel].column == COLUMNS:
+        stated = [value_of_column(column, channel, unit) if column.title else None for column in table.columns]
+    else:
+        stated = _stated_per_column(table.columns, channel, mapping[channel].column)
     values = sorted({held[0] for held in stated if held})
     shared = [at for at, held in enumerate(stated) if held is None and table.columns[at].title]
     of_each = [[at for at, held in enumerate(stated) if held and held[0] == value] for value in values]
@@ -246,13 +260,32 @@ def stacked_columns(table: Table, reading: Reading) -> Table:
     message = f"{channel} is {listed} {unit} by the columns: their rows were read one below the other"
     return replace(
         table,
-        columns=(*columns, FileColumn(COLUMNS, unit, title=COLUMNS)),
+        columns=(*columns, FileColumn(mapping[channel].column, unit, title=mapping[channel].column)),
         read=read,
         head=tuple(map(tuple, head)),
         line_of=None,
         breaks=(),
         notices=[*table.notices, Notice(code="stacked", message=message)],
     )
+
+
+def _stated_per_column(columns: Sequence[FileColumn], channel: str, choice: str) -> list[tuple[float, str] | None]:
+    """A channel's value for each column by the caller's map (`=5@torque_5bar,=10@torque_10bar`), with the quantity that the
+    column holds: by its title, else torque. Raises InvalidError for a value that is none or a title that no column has."""
+    values: dict[str, float] = {}
+    for part in re.split(r",(?==[^,@]*@)", choice):
+        text, _, title = part[1:].partition("@")
+        values[title.strip()] = _value(channel, ColumnChoice(column=f"={text.strip()}"), {})
+    titles = [next((name for name in (column.title, column.name) if name in values), "") for column in columns]
+    if lacking := [title for title in values if title not in titles]:
+        message = f"map gives {channel} a value for a column {lacking[0]!r}, which the table does not have"
+        raise InvalidError.of(message, code="invalid_map", pointer="/map", value=lacking[0])
+    found: list[tuple[float, str] | None] = []
+    for column, title in zip(columns, titles, strict=True):
+        within = value_of_column(column, channel)
+        quantity = within[1] if within and within[1] != CELLS else "torque_nm"
+        found.append((values[title], quantity) if title in values else None)
+    return found
 
 
 def value_of_column(column: FileColumn, channel: str, unit: str | None = None) -> tuple[float, str] | None:

@@ -27,6 +27,11 @@ ALL = "*"
 NO_MISSING, ABOVE = "none", "above"
 
 
+def is_per_column(name: str) -> bool:
+    """Whether a choice is a constant of one column (`=5@torque_5bar`), or several of them separated by commas."""
+    return name.startswith("=") and "@" in name
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ColumnChoice:
     """The column of a channel: its title, or a constant's text (`constants`), and its unit; value = factor · converted
@@ -44,7 +49,8 @@ class ColumnChoice:
     def is_constant(self) -> bool:
         """Whether it names a value in place of a column: `=5 bar`, or `=LABEL` for the text beside a label above the
         table."""
-        return self.column.startswith("=") and self.column not in (COLUMNS, SHEETS, CELLS)
+        pseudo = self.column in (COLUMNS, SHEETS, CELLS) or is_per_column(self.column)
+        return self.column.startswith("=") and not pseudo
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

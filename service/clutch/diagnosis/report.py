@@ -204,7 +204,7 @@ def _friction_law(law: FrictionLaw) -> shapes.FrictionLawOut:
         law,
         where=[
             shapes.LawBandOut(
-                axis="speed_rpm",
+                axis="speed",
                 from_rpm=_rounded(band.low / RADIANS_PER_SECOND_PER_RPM),
                 to_rpm=_rounded(band.high / RADIANS_PER_SECOND_PER_RPM),
                 share=_rounded(band.share),

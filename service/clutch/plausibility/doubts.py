@@ -32,12 +32,14 @@ from service.clutch.analysis import Analysis
 from service.clutch.incoming_run import IncomingRun
 from service.clutch.plausibility.reading import DEAD, DEAD_PRESSURE, columns_of, dead_channels, runs_of, shown_by
 from service.clutch.timeline import Event, Shown, beyond_end, lives_of, order, with_event
-from service.errors import Notice
+from service.errors import Hypothesis, Notice
 
 OFF_PACE, AGAINST_TIME = "cycles_off_pace", "cycles_against_time"
 BEYOND_PHYSICS, OFF_COURSE = "cof_beyond_physics", "cof_off_course"
 #: Of many runs with one cause: a counter that changed, or runs of two clutches under one name.
-COUNTER, TWO_NAMES = "counter_changed", "two_clutches"
+COUNTER = "counter"
+#: The kinds of hypotheses, as answers call them.
+_KINDS = {OTHER_UNIT: "other_unit", TWO_CLUTCHES: "other_clutch"}
 UNIT = "unit"
 
 
@@ -83,19 +85,26 @@ def common_doubts(cause: CommonCause, events: Sequence[Event]) -> dict[str, tupl
         TWO_CLUTCHES: f"Are runs since {own[0].run_id} on {day} another clutch's, or was the clutch rebuilt? By their dates "
         f"they do not go with the others, which reach {reached} cycles",
     }[cause.name]
+    hypothesis = Hypothesis(
+        name=f"{COUNTER}-{own[0].run_id}",
+        kind=_KINDS.get(cause.name, cause.name),
+        runs=tuple(event.run_id for event in own),
+        cycles_offset=cause.number if cause.name in (RESTART, ROLL_OVER, OFFSET) else None,
+        cycles_factor=cause.number if cause.name == OTHER_UNIT else None,
+    )
     doubts: dict[str, tuple[Notice, ...]] = {}
     for event, cycles in zip(own, cause.cycles, strict=True):
         if cause.name == TWO_CLUTCHES:
             message = (
                 f"{question}. Withdraw them together, or send maintenance with the event rebuild, or confirm them."
             )
-            doubts[event.run_id] = (Notice(code=TWO_NAMES, message=message),)
+            doubts[event.run_id] = (Notice(code=COUNTER, message=message, hypothesis=hypothesis),)
             continue
         message = (
             f"{question}. {reached} cycles were reached before; this run, sent at {_number(event.cycles)}, would be at "
             f"{_number(cycles)}. Correct them together, or confirm them."
         )
-        doubts[event.run_id] = (Notice(code=COUNTER, message=message, likely_cycles=cycles),)
+        doubts[event.run_id] = (Notice(code=COUNTER, message=message, likely_cycles=cycles, hypothesis=hypothesis),)
     return doubts
 
 

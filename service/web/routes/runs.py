@@ -24,6 +24,7 @@ from service.api.run import (
     Confirmations,
     Correction,
     Corrections,
+    DoubtAnswer,
     Receipt,
     RunOut,
     RunPage,
@@ -48,6 +49,7 @@ from service.web.problems import READING, SENDING, described
 from storage import changes
 
 router = APIRouter(prefix="/v1/clutches/{clutch_id}/runs", tags=["runs"])
+doubt_router = APIRouter(prefix="/v1/clutches/{clutch_id}/doubts", tags=["runs"])
 
 SENDING_FILE = SENDING | described(NoRoomError)
 
@@ -316,6 +318,21 @@ async def confirm_runs(of: responses.ChangeOf) -> Response:
 async def confirm_run(of: responses.ChangeOf, run_id: parameters.RunId) -> Response:
     """Accept a held run as it was sent."""
     return await _changed(of, changes.CONFIRM, run_id, await responses.sent(of.request, Confirmation))
+
+
+@doubt_router.post(
+    "/{doubt_id}/answer",
+    **responses.taking(DoubtAnswer, RunPage, {"accept": True, "reason": "the counter restarted at zero"}),
+)
+async def answer_doubt(of: responses.ChangeOf, doubt_id: parameters.DoubtId) -> Response:
+    """Answer a doubt about several held runs (`id` and `hypothesis` in their `doubts`) in one step. If you accept it, all
+    its runs get their likely cycles, or are withdrawn if they are another clutch's. If you do not, they are accepted as
+    they were sent. `/runs/correct` and `/runs/restore` undo it.
+    """
+    answer = await responses.sent(of.request, DoubtAnswer)
+    by, at = grant_of(of.request).name, responses.now()
+    settle = partial(change_run.answer_doubt, accept=answer.accept, reason=answer.reason, by=by, at=at)
+    return responses.json_answer(RunPage(items=await responses.changed(of, settle, doubt_id), next=None))
 
 
 async def _changed(

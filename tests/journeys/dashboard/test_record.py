@@ -71,6 +71,7 @@ def test_a_record_is_edited_undone_and_copied(watched: Watched, server: Server) 
     form.get_by_label("Friction material").fill("sinter")
     form.get_by_label("Reason").fill("a slip")
     page.keyboard.press("Enter")
+    expect(page.locator(".description")).to_contain_text("Sinter on steel")
     page.get_by_role("button", name="Undo").click()
     expect(page.locator(".description")).to_contain_text("Carbon on steel")
     assert record(server, "bench")["friction_material"] == "carbon"

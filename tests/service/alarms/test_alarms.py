@@ -64,9 +64,12 @@ def test_a_posted_run_raises_an_alarm_once_and_not_again_when_it_is_acknowledged
     assert raised["state"] == "raised"
     assert raised["value"] < limit == raised["limit"]
     assert raised["message"].startswith("e: safe for ")
+    listed = next(item for item in life.get("/v1/clutches").json()["items"] if item["clutch_id"] == "e")
+    assert (listed["open_alarms"], listed["what_to_do"]) == (1, listed["action"])
     address = f"/v1/alarms/events/{raised['event_id']}"
     seen = life.post(f"{address}/acknowledge", json={"note": "ordered"})
     assert seen.status_code == 200
+    assert life.get("/v1/clutches/e").json()["open_alarms"] == 0
     said = {"state": "acknowledged", "note": "ordered", "acknowledged_by": "local"}
     assert said.items() <= seen.json().items()
     post_run(life, {"kind": "duty_cycles", "cycles": 4500, "duty": {"cycles": 500}}, "e")

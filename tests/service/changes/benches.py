@@ -229,7 +229,8 @@ def assert_same_but_for_held(held: Bench, never: Bench) -> None:
 def without_held(answer: Any) -> Any:
     """An answer without what it says of held runs."""
     if isinstance(answer, dict):
-        said = ("held_runs", "at_least", "at_least_at", "counted_from", "statement", "state", "headline", "action")
+        said = ("held_runs", "at_least", "at_least_at", "counted_from", "statement", "state", "headline")
+        said += ("action", "what_to_do")
         return {name: without_held(value) for name, value in answer.items() if name not in said}
     if isinstance(answer, list):
         spoken = [item for item in answer if not isinstance(item, dict) or "held_runs" not in item.values()]

@@ -221,6 +221,23 @@ def _restarted(bench: Bench) -> None:
     assert {one["run_id"]: (one["state"], one["doubts"]) for one in undone} == {
         name: ("held", before[name]["doubts"]) for name in held
     }
+    # one question, one answer
+    (question,) = {json.dumps([doubt["id"], doubt["hypothesis"]]) for name in held for doubt in before[name]["doubts"]}
+    doubt_id, hypothesis = json.loads(question)
+    proposal = {"cycles_offset": 3000}
+    assert hypothesis == {"kind": "restart", "runs": [f"t{k}" for k in range(6, 10)], "proposal": proposal}
+    said = {"by": "me", "at": AT, "reason": ""}
+    accepted = change_run.answer_doubt(bench.database, CLUTCH, doubt_id, accept=True, **said)
+    assert {one.run_id: (one.state, one.cycles) for one in accepted} == {
+        name: ("accepted", cycles) for name, cycles in likely.items()
+    }
+    with pytest.raises(NotFoundError):  # it is answered
+        change_run.answer_doubt(bench.database, CLUTCH, doubt_id, accept=True, **said)
+    change_run.change(bench.database, CLUTCH, held, cycles=sent_cycles, **correcting)
+    refused = change_run.answer_doubt(bench.database, CLUTCH, doubt_id, accept=False, **said)
+    assert {one.run_id: (one.state, one.cycles) for one in refused} == {
+        name: ("accepted", cycles) for name, cycles in sent_cycles.items()
+    }
 
 
 def test_several_runs_are_withdrawn_and_restored_in_one_step(bench: Bench) -> None:

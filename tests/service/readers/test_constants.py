@@ -166,3 +166,23 @@ def test_a_rate_that_is_stated_once_is_suggested(tmp_path: Path, name: str, abov
     if suggestion is not None:
         profile = reading_with(suggestion.profile, Reading())
         assert read_file(tmp_path / name, filename=name, reading=profile).columns["time_s"][-1] == pytest.approx(5.99)
+
+
+@pytest.mark.parametrize(
+    ("titles", "mapping"),
+    [
+        ("M1 [Nm];M2 [Nm]", "pressure_bar:=5@M1 [Nm],pressure_bar:=1 MPa@M2"),
+        ("torque_5bar;torque_10bar", "pressure_bar:=5@torque_5bar,pressure_bar:=10@torque_10bar,torque_nm:torque"),
+    ],
+)
+def test_a_constant_of_each_column_stands_below_the_others(tmp_path: Path, titles: str, mapping: str) -> None:
+    path = tmp_path / "a.csv"
+    rows = [f"{speed};{30 - speed / 100};{60 - speed / 50}" for speed in (20, 100, 500, 1000, 1500)]
+    path.write_text("\n".join([f"speed_rpm;{titles}", *rows]) + "\n")
+    channels = read_file(path, filename="a.csv", reading=reading_of(mapping)).columns
+    assert channels["pressure_bar"].tolist() == [5.0] * 5 + [10.0] * 5
+    assert channels["torque_nm"].tolist() == [29.8, 29.0, 25.0, 20.0, 15.0, 59.6, 58.0, 50.0, 40.0, 30.0]
+    with pytest.raises(InvalidError, match="a column 'M9', which the table does not have"):
+        read_file(
+            path, filename="a.csv", reading=reading_of(f"{mapping},pressure_bar:=7@M9".replace(",torque_nm:torque", ""))
+        )

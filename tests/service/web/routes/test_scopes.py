@@ -79,6 +79,7 @@ OF_ONE |= {("POST", f"{CLUTCH}/remaining-useful-life/forecast"): "read"}
 OF_ONE |= {("POST", f"{CLUTCH}/{path}"): "ingest" for path in ("runs", "runs/file", "diagnoses", "inspections")}
 OF_ONE |= {("POST", f"{CLUTCH}/inspections/{{inspection_id}}/photographs"): "ingest"}
 OF_ONE |= {("POST", f"{CLUTCH}/inspections/{{inspection_id}}/{change}"): "admin" for change in ("withdraw", "restore")}
+OF_ONE |= {("POST", f"{CLUTCH}/doubts/{{doubt_id}}/answer"): "admin"}
 OF_ONE |= {("POST", f"{CLUTCH}/runs/{change}"): "admin" for change in ("confirm", "correct", "withdraw", "restore")}
 OF_ONE |= {("POST", f"{CLUTCH}/runs/{{run_id}}/{change}"): "admin" for change in ("withdraw", "restore", "confirm")}
 OF_ONE |= {
