@@ -13,6 +13,7 @@ from models.diagnosis.experiments.test_plan import advise, rivals_of
 from models.diagnosis.explanations.decide import judge
 from models.diagnosis.explanations.posterior import posterior_of
 from models.diagnosis.explanations.sizes import sizes_of
+from models.diagnosis.explanations.verdict import Verdict
 from models.diagnosis.pooled_fit.baseline_fit import IndeterminateError, fit_baseline, missing_for_baseline
 from models.diagnosis.raw_records.evidence import raw_evidence
 from models.diagnosis.report.assemble import insufficient, report_of
@@ -52,6 +53,8 @@ def diagnose(
     judgement = judge(posterior)
     extended, gain = validate(problem, posterior.null.fit, judgement, of_gain)
     sizes = sizes_of(problem, judgement, of_sizes)
+    if judgement.verdict is Verdict.CAUSE_NAMED and sizes.sign_is_open:  # it may do the opposite, or nothing
+        judgement = replace(judgement, verdict=Verdict.CAUSE_AMBIGUOUS)
     advice = advise(campaign, problem, *rivals_of(judgement))
     law = friction_law_of(problem, judgement.stand[0].fit if judgement.stand else posterior.null.fit, of_law)
     report = report_of(baseline, posterior, judgement, raw, extended, gain, sizes, advice, law)

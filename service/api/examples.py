@@ -83,8 +83,7 @@ _OWN: dict[str, Any] = {
     "with_test": 0.99, "log_evidence_gain": 31.0,
     "log_score_gain": 12.5, "mse_percent_before": 4.8, "nats": 3.2, "pause_hours": 0.0,
     "speeds_rpm": [20, 500, 1000, 1970],
-    "not_adoptable": "Do not adopt it: not even the sign of pressure offset is sure (wrong with probability 0.16; "
-    "90 % interval −1.4 to 0.29 bar).",
+    "not_adoptable": "Adopt nothing before the next diagnosis.",
     "notes": ["2026-11-02-dynamic is left out: its record has no period"], "p_value": 1e-09,
     "prediction_log_score_gain": 4.1, "probability": 0.98, "rmse_after_nm": 0.18, "rmse_before_nm": 0.31,
     "separates": ["oil_temperature", "viscous_exponent"], "sign_probability": 0.99,

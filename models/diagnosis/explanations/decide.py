@@ -1,4 +1,4 @@
-"""The verdict, read off the explanations and off nothing else.
+"""The verdict, read off the explanations; where the sign of a named cause is open, the case is ambiguous (`diagnose`).
 
 p(nothing) >= LIKELY                                            the model is adequate
 C = the causes of probability >= SURE,

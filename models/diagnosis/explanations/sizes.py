@@ -51,6 +51,11 @@ class Sizes:
     draws: tuple[Draw, ...] = ()
     by_slug: Mapping[str, Size]
 
+    @property
+    def sign_is_open(self) -> bool:
+        """Whether a cause's less likely sign has more than SIGN_UNDETERMINED of the probability."""
+        return any(size.other_sign > criteria.SIGN_UNDETERMINED for size in self.by_slug.values())
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Component:

@@ -27,7 +27,7 @@ from models.diagnosis.report.friction_law import FrictionLaw
 from models.diagnosis.report.isolability import unseen_of, visible_of
 from models.diagnosis.report.maps import loop_traces, residual_maps
 from models.diagnosis.report.report import Candidate, Report, misfit_of
-from models.diagnosis.report.summary import effect_name, number, size_of, summarise
+from models.diagnosis.report.summary import effect_name, number, summarise
 from models.diagnosis.validation.held_out import Gain
 
 
@@ -124,16 +124,7 @@ def reason_against(verdict: Verdict, gain: Gain | None, sizes: Sizes) -> str:
     if gain is not None and (gain.rmse_after > criteria.MOST_WORSE * gain.rmse_before or gain.log_score_gain < 0):
         it = "it" if len(sizes.by_slug) == 1 else "them"
         return f"Do not adopt {it}, even if confirmed: with {it}, the model predicts other runs no better than without."
-    sentences = []
-    for slug, size in sizes.by_slug.items():
-        if size.other_sign > criteria.SIGN_UNDETERMINED:
-            effect = BY_SLUG[slug]
-            low, high = (size_of(slug, effect.scale * end, effect.unit) for end in size.interval)
-            sentences.append(
-                f"Do not adopt it: not even the sign of {effect_name(slug)} is sure (wrong with probability "
-                f"{size.other_sign:.2f}; 90 % interval {low.partition(' ')[0]} to {high})."
-            )
-    return " ".join(sentences)
+    return ""
 
 
 def statistics_of(posterior: Posterior, judgement: Judgement, scatter: RunScatter) -> dict[str, float]:
