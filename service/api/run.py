@@ -175,7 +175,7 @@ class Warned(base.Answer):
     message: str = Field(description="The warning in a sentence")
 
 
-class Proposal(base.Answer):
+class CycleCorrection(base.Answer):
     """A correction of cycles: an offset or a factor; empty if the runs have neither in common."""
 
     cycles_offset: base.Real | None = Field(
@@ -191,7 +191,7 @@ class CounterHypothesis(base.Answer):
         description="What happened to the counter of cycles; `other_clutch`: the runs are another clutch's"
     )
     runs: list[str] = Field(description="The runs that it explains")
-    proposal: Proposal = Field(description="The correction of their cycles")
+    proposal: CycleCorrection = Field(description="The correction of their cycles")
 
 
 class Doubt(Warned):

@@ -262,6 +262,7 @@ def test_the_least_isolable_cause_goes_first_and_the_other_is_judged_by_what_it_
     assert isolable({unfitted: 0.0}, isolabilities) == ({unfitted: 0.0}, {})  # each by its ι alone
 
 
+@pytest.mark.slow
 def test_what_was_not_refitted_counts_as_its_likeliest_parent_promises() -> None:
     some = 0.2  # of an inertia that bends the baseline
     quiet = campaign(1, lambda at: some * PLANTED["inertia_torque"](at))

@@ -321,6 +321,7 @@ def test_the_ukf_books_the_step_of_each_event_on_that_event() -> None:
     assert ends[0].end_of_life[0.5] == pytest.approx(ends[1].end_of_life[0.5], rel=0.05)
 
 
+@pytest.mark.slow
 def test_the_ukf_bears_more_events_than_anyone_logs() -> None:
     """A sensor is zeroed before each of 60 tests: each begins an epoch, and has a step of its own."""
     rng = np.random.default_rng(5)
