@@ -120,7 +120,7 @@ def _rows_near(
 
 
 def _block_medians(values: FloatArray, block: NDArray[np.int64], edges: NDArray[np.int64]) -> FloatArray:
-    """Median of values [n] in each block; `block` [n] is ascending and starts anew at each edge."""
+    """Median of values [n] in each block; `block` [n] is ascending and starts again at each edge."""
     ordered = values[np.lexsort((values, block))]
     first, count = edges[:-1], np.diff(edges)
     return np.asarray(0.5 * (ordered[first + (count - 1) // 2] + ordered[first + count // 2]), dtype=np.float64)
