@@ -269,11 +269,11 @@ class Limit:
         return first_below(np.where(was_good | ~was_good[-1], from_above, np.inf), progress, level)
 
 
-def places(now: float, horizon: float, behind: int = 40, ahead: int = 200) -> FloatArray:
+def places(now: float, horizon: float) -> FloatArray:
     """Progress ζ [k] at which paths are evaluated: evenly up to `now` >= 0, the present age, and in equal ratios to
     `horizon`."""
     start = max(now, 1.0)
-    return path_places(start, max(horizon, 2.0 * start), behind, ahead)
+    return path_places(start, max(horizon, 2.0 * start), 40, 200)
 
 
 def first_reached(

@@ -240,6 +240,22 @@ def _restarted(bench: Bench) -> None:
     }
 
 
+def test_runs_that_are_another_clutchs_are_withdrawn_by_one_answer(tmp_path: Path) -> None:
+    own = [(f"t{k}", 500.0 * k, 2 * k + 1) for k in range(10)]
+    others = [(f"u{k}", 700.0 + 900.0 * k, 20 + 2 * k) for k in range(3)]
+    with closing(Bench(tmp_path / "bench.db")) as bench:
+        for name, cycles, day in (*own, *others):
+            bench.send(body("test", name, cycles) | {"started_at": f"2026-03-{day:02d}T18:00:00+00:00"})
+        held = {name: receipt for name, receipt in bench.receipts().items() if receipt["state"] == "held"}
+        names = [name for name, _, _ in others]
+        assert sorted(held) == names
+        (doubt,) = held["u0"]["doubts"]
+        assert doubt["hypothesis"] == {"kind": "other_clutch", "runs": names, "proposal": {}}
+        said = {"by": "me", "at": AT, "reason": "they are of bench 4"}
+        out = change_run.answer_doubt(bench.database, CLUTCH, doubt["id"], accept=True, **said)
+    assert {receipt.run_id: receipt.state for receipt in out} == dict.fromkeys(names, "withdrawn")
+
+
 def test_several_runs_are_withdrawn_and_restored_in_one_step(bench: Bench) -> None:
     bench.send_tests(0, 1000, 2000)
     names, who = ["a1000", "a2000"], {"reason": "another clutch's", "by": "me", "at": AT}
