@@ -112,7 +112,8 @@ def law_columns(design: Design, prediction: Prediction, effects: Sequence[Fitted
     Effects in proportion to friction change when the laws do. That part is found by raising M_s, M̄_c, V_S, C_v and log C a
     little, one at a time; without it a fit of heating by a fifth of the torque ended 49 nats short, and with an error of
     0.1 % in it one of oil temperature 5. An effect of so many Nm has it only where friction lags behind it. It is left out
-    where an effect reads the laws at another pressure or at other cycles (pressure offset, gauge hysteresis, load severity).
+    where an effect reads the laws at another pressure or at other cycles (pressure offset, gauge hysteresis, load severity,
+    wear at a faster pace).
     """
     scene, changes = prediction.scene, np.zeros((design.rows.run.size, RAISED))
     moving = [one for one in effects if one.effect.grows_with is None or one.effect.lags(one.shape)]

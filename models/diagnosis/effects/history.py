@@ -26,8 +26,10 @@ from models.diagnosis.effects.effect import (
 #: Whether what a rest did settles with use alone, or by the test's clock as well; and the log of its settling time [s],
 #: which with use alone stays where it is.
 BY_USE, BY_CLOCK, SETTLING = 0.0, 1.0, (math.log(20.0), math.log(1e4))
-#: What is changed: the static torque's part of the curve, or all of it.
-STATIC, WHOLE = 0.0, 1.0
+#: What is changed: the static torque's part of the curve, all of it, or the pace at which all four parameters age.
+STATIC, WHOLE, PACE = 0.0, 1.0, 2.0
+#: How many times as much a cycle may count after the onset, less one.
+_PACES = np.concatenate([[0.0], np.geomspace(1e-2, 30.0, 120)])
 
 
 def _carried(scene: Scene, part: float) -> FloatArray:
@@ -130,27 +132,41 @@ OIL_CHANGE = Effect(
 )
 
 
+def _faster(scene: Scene, lost: float, onset: float) -> FloatArray:
+    """Change of torque [P] Nm, S(ζ + x (ζ - ζ_k)₊) - S(ζ), with x such that the baseline's static torque has lost a further
+    share by the last state."""
+    last, cycles = float(scene.facts.states[-1]), scene.points.cycles
+    reached = last + _PACES * (last - onset)
+    static = scene.laws.parameters(np.full(reached.size, scene.facts.usual_pressure), reached)[:, 0]
+    pace = float(np.interp(abs(lost), np.maximum.accumulate(1.0 - static / static[0]), _PACES))
+    changed = scene.curve_at(cycles=cycles + pace * np.maximum(cycles - onset, 0.0)) - scene.curve_at()
+    return changed if lost >= 0.0 else -changed
+
+
 def _accelerated_wear_grid(facts: Facts) -> tuple[Tried, ...]:
     if facts.states.size < 4:
         return ()
     onsets = sorted({cycles for low, onset, _ in facts.onsets[1:] for cycles in (low, onset)})
     weight = -float(np.log(len(onsets)))
-    return tuple(Tried(shape=(onset, power), log_weight=weight) for onset in onsets for power in (1.0, 2.0))
+    forms = ((1.0, PACE), (1.0, STATIC), (2.0, STATIC))
+    return tuple(Tried(shape=(onset, *form), log_weight=weight) for onset in onsets for form in forms)
 
 
 def _accelerated_wear_change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
-    onset, power = shape
+    onset, power, part = shape
     late = np.maximum(scene.points.cycles - onset, 0.0) / max(float(scene.facts.states[-1]) - onset, 1.0)
+    if part == PACE:
+        return _faster(scene, amplitude, onset)
     return np.asarray(-amplitude * _carried(scene, STATIC) * np.minimum(late, 10.0) ** power, dtype=np.float64)
 
 
 ACCELERATED_WEAR = Effect(
     slug="accelerated_wear",
     title="Wear accelerates late in life",
-    physics="Glazing, lost porosity or torn fibres: at some cycle the static torque begins to fall faster than the model's "
-    "course.",
+    physics="Glazing, lost porosity or torn fibres: from some cycle on static torque falls faster than in the model's "
+    "course, or every cycle ages the clutch more.",
     check="inspect the lining for glazing and torn fibres",
-    formula="-a M_s ∂S/∂M_s ((ζ - ζ_k)₊/(ζ_last - ζ_k))^q",
+    formula="-a M_s ∂S/∂M_s ((ζ - ζ_k)₊/(ζ_last - ζ_k))^q, or S(ζ + x (ζ - ζ_k)₊) - S(ζ)",
     source="Ompusunggu et al. 2013, figs. 4 and 5: glazing and lost porosity",
     kind=EffectKind.COURSE,
     amplitude="further loss of static torque by the last state",
@@ -163,6 +179,7 @@ ACCELERATED_WEAR = Effect(
     shapes=(
         ShapeParameter(name="onset ζ_k", unit="cycles"),
         ShapeParameter(name="power q", unit="-"),
+        ShapeParameter(name="what is changed", unit="-"),
     ),
     grid=_accelerated_wear_grid,
     change=_accelerated_wear_change,

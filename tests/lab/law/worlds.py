@@ -81,26 +81,42 @@ _FALLS: dict[str, Callable[[FloatArray], FloatArray]] = {
     "exponential": lambda u: -np.expm1(-u / _HALF * np.log(2.0)),
     "rational": lambda u: (u / _HALF) ** 2 / (1.0 + (u / _HALF) ** 2),
 }
+#: Forms on which nothing was chosen: a fall with a level start, one that never ends, one that is steepest at rest, and one
+#: after a rise by a fifteenth of the fall.
+_FURTHER_FALLS: dict[str, Callable[[FloatArray], FloatArray]] = {
+    "gaussian": lambda u: -np.expm1(-((u / _HALF) ** 2) * np.log(2.0)),
+    "logarithm": lambda u: 0.5 * np.log2(1.0 + u / _HALF),
+    "root": lambda u: -np.expm1(-np.sqrt(u / _HALF) * np.log(2.0)),
+    "hump": lambda u: -np.expm1(-u / _HALF * np.log(2.0)) - 0.07 * np.exp(-(np.log(5.0 * u / _HALF + 1e-9) ** 2)),
+}
 #: Straight pressure laws bow by this share of a bar's change for each bar from 5 bar on.
 _BOW = 0.04
-FORMULAS = (*_FALLS, "bowed")
+#: From the middle of the life on every cycle counts so much more, with a corner of this width (a share of the life): a knee
+#: in all four laws.
+_KNEE, _CORNER = 1.5, 0.05
+FORMULAS = (*_FALLS, "bowed", *_FURTHER_FALLS, "knee")
 
 
 @contextmanager
 def _formula(name: str) -> Iterator[None]:
-    """While it lasts the blind rig's clutches have another law: a form of the fall, or bowed laws over pressure."""
-    torque, law = rig.Law.torque, rig.Clutch.law
+    """While it lasts the blind rig's clutches have another law: a form of the fall, bowed laws over pressure, or laws with a
+    knee over life."""
+    torque, law, fall = rig.Law.torque, rig.Clutch.law, (_FALLS | _FURTHER_FALLS).get(name)
 
     def other(self: rig.Law, v: FloatArray, *, film: FloatArray | None = None, gamma: float = rig.GAMMA) -> FloatArray:
         w = np.maximum(v if film is None else film, 1e-9)
-        return self.static * (1.0 + (self.ratio - 1.0) * _FALLS[name](w / self.stribeck)) + self.viscous * v**gamma
+        return self.static * (1.0 + (self.ratio - 1.0) * fall(w / self.stribeck)) + self.viscous * v**gamma
 
     def bowed(self: rig.Clutch, bar: FloatArray, cycles: FloatArray) -> rig.Law:
         return law(self, bar - _BOW * (bar - 5.0) ** 2, cycles)
 
+    def knee(self: rig.Clutch, bar: FloatArray, cycles: FloatArray) -> rig.Law:
+        corner = _CORNER * self.span
+        return law(self, bar, cycles + _KNEE * corner * np.logaddexp(0.0, (cycles - 0.5 * self.span) / corner))
+
     try:
-        if name == "bowed":
-            rig.Clutch.law = bowed  # type: ignore[method-assign]
+        if fall is None:
+            rig.Clutch.law = {"bowed": bowed, "knee": knee}[name]  # type: ignore[method-assign]
         else:
             rig.Law.torque = other  # type: ignore[method-assign]
         yield
@@ -109,8 +125,8 @@ def _formula(name: str) -> Iterator[None]:
 
 
 def of_formula(name: str, seed: int) -> World:
-    """A campaign of the blind rig with nothing hidden, of another formula than eq. 3; every second one has loops, every
-    second pair a tenth of a percent of noise in place of a third."""
+    """A campaign of the blind rig of another formula than eq. 3, nothing hidden but the wear of a knee; every second one
+    has loops, every second pair a tenth of a percent of noise in place of a third."""
     with _formula(name):
         hidden = hide((seed, 2026, FORMULAS.index(name)), (), 0.0, loops=seed % 2 == 0, noise=(1.0, 0.3)[seed // 2 % 2])
-        return World(campaign(hidden), None, 0.0)
+        return World(campaign(hidden), *(("accelerated_wear", 1.0) if name == "knee" else (None, 0.0)))

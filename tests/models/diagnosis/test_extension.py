@@ -10,6 +10,7 @@ from models.diagnosis.campaign import Campaign, DutyRun, StationaryRun
 from models.diagnosis.criteria import MOST_PLATEAUS
 from models.diagnosis.effects.catalogue import BY_SLUG
 from models.diagnosis.effects.fitted_effect import Draw, FittedEffect, ranges_of, small_factors_at
+from models.diagnosis.effects.history import STATIC
 from models.diagnosis.effects.readings import DAYS, STRAIGHT
 from models.diagnosis.effects.thermal import log_viscosity_ratio
 from models.diagnosis.extension import Extension, NotFiniteError, build_extension, facts_from, facts_to
@@ -46,7 +47,7 @@ def extension_of(given: Study, *effects: tuple[str, float, tuple[float, ...]], c
 
 
 TEMPERATURE = ("oil_temperature", 0.4, (0.0, -40.0))  # a film that has the oil's temperature
-WEAR = ("accelerated_wear", 0.05, (ONSET, 1.0))
+WEAR = ("accelerated_wear", 0.05, (ONSET, 1.0, STATIC))
 
 
 def test_json_carries_it_exactly(warm):

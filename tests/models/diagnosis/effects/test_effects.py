@@ -21,7 +21,7 @@ from models.diagnosis.effects.catalogue import BY_SLUG, CATALOGUE
 from models.diagnosis.effects.effect import Effect, EffectKind
 from models.diagnosis.effects.faults import last_direction
 from models.diagnosis.effects.fitted_effect import FittedEffect, discrepancy_factors, law_columns
-from models.diagnosis.effects.history import BY_CLOCK, BY_USE, STATIC, WHOLE
+from models.diagnosis.effects.history import BY_CLOCK, BY_USE, PACE, STATIC, WHOLE
 from models.diagnosis.effects.moving import FILM, FIRST_ORDER, LEAST_TIME, MOST_POWER, THICKNESS, usual_slope
 from models.diagnosis.effects.readings import DAYS, STRAIGHT
 from models.diagnosis.effects.thermal import HERSEY, log_viscosity_ratio, viscosity
@@ -164,6 +164,19 @@ def test_a_delay_is_the_torque_of_a_moment_before(scene: Scene) -> None:
     expected = np.interp(phase - late, phase, scene.curve[loop], period=2 * np.pi)
     away = scene.points.velocity[loop] > 1.0  # the cusp at rest is no parabola
     np.testing.assert_allclose(delayed[loop][away], expected[away], rtol=2e-4)
+
+
+def test_wear_at_a_pace_is_the_clutch_of_later(scene: Scene) -> None:
+    """Where cycles count twice from some on, torque is that of the cycles so counted, and the amplitude is the static torque
+    that is lost by them at the last state."""
+    facts, onset, last = scene.facts, float(scene.facts.states[3]), float(scene.facts.states[-1])
+    counted = scene.points.cycles + np.maximum(scene.points.cycles - onset, 0.0)
+    ends = np.array([last, last + (last - onset)])
+    static = scene.laws.parameters(np.full(2, facts.usual_pressure), ends)[:, 0]
+    lost = 1.0 - float(static[1] / static[0])
+    change = BY_SLUG["accelerated_wear"].change(scene, lost, (onset, 1.0, PACE))
+    np.testing.assert_allclose(change, scene.curve_at(cycles=counted) - scene.curve, atol=2e-3 * np.abs(change).max())
+    assert lost > 0.01
 
 
 def test_viscosity_meets_its_two_points_and_one_of_the_reference() -> None:

@@ -10,6 +10,7 @@ from models.diagnosis.campaign import Campaign, DutyRun, DynamicRun
 from models.diagnosis.criteria import WORTHWHILE
 from models.diagnosis.design.design import build_design
 from models.diagnosis.effects.catalogue import BY_SLUG
+from models.diagnosis.effects.history import STATIC
 from models.diagnosis.effects.readings import STRAIGHT
 from models.diagnosis.effects.thermal import AT_ONCE
 from models.diagnosis.experiments.candidates import OIL_SETTLING, PASSES, TRIALS, steps_of, with_trial
@@ -78,7 +79,7 @@ def moving(key: str) -> bool:
 def test_a_zero_is_parted_from_wear_by_an_open_clutch(warm):
     """A shifted zero stays without pressure, wear does not."""
     zero = beside(warm, "torque_zero_shift", -0.6, (0.0, 8000.0, *STRAIGHT))
-    wear = beside(warm, "accelerated_wear", 0.03, (6000.0, 1.0))
+    wear = beside(warm, "accelerated_wear", 0.03, (6000.0, 1.0, STATIC))
     found = advised(warm, zero, wear)
     assert found[0].key == "open_sweep"
     assert found[0].nats > WORTHWHILE
@@ -132,7 +133,7 @@ def test_without_oil_temperature_it_is_asked_for(warm):
     assert "oil temperature recorded" in first.test
     assert first.nats > WORTHWHILE
     # a zero that is out of the race is no reason to ask
-    wear = beside(blind, "accelerated_wear", 0.03, (6000.0, 1.0))
+    wear = beside(blind, "accelerated_wear", 0.03, (6000.0, 1.0, STATIC))
     assert all(each.other != "oil_temperature" for each in advised(blind, wear, nearby=(zero,)))
     # the control: where it was measured nobody asks for it
     measured = warm.extended(("torque_zero_shift", 0.3, (1.0, 0.0, *STRAIGHT)))
