@@ -112,8 +112,8 @@ def cycles_in(filename: str) -> float | None:
         values = [value for value, said in numbers if said == by and (by == "cycles" or _is_count(value))]
         if values:
             return values[0] if len(values) == 1 else None
-    only = len(numbers) == 1 and numbers[0][1] == "nothing" and _is_count(numbers[0][0])
-    return numbers[0][0] if only else None
+    alone = [value for value, said in numbers if said == "nothing"]
+    return alone[0] if len(alone) == 1 and _is_count(alone[0]) else None
 
 
 def _only_number(stem: str) -> float | None:

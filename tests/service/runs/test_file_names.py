@@ -17,6 +17,7 @@ from service.runs.file_names import cycles_in, kind_in, suggested
         ("run-0012 after 250 cycles.csv", None, 250),
         ("cycles=3_sweep.csv", "stationary_stribeck", 3),
         ("7000.csv", None, 7000),
+        ("bench3_7000.csv", None, 7000),
         ("stationary-0.csv", "stationary_stribeck", 0),
     ],
 )
