@@ -78,9 +78,11 @@ def create_app(settings: Settings) -> FastAPI:
             database = open_database(settings.database, serving=True)
             raw_records.use(database, settings.raw)
             folder = emptied_folder(database.path)
-            log, note = (settings.log_format, settings.log_level), metrics.note_calls
+            log, gauges = (settings.log_format, settings.log_level), metrics.calls
             workers = (
-                in_processes(database, settings.workers, log, note) if settings.workers else in_threads(database, note)
+                in_processes(database, settings.workers, log, gauges)
+                if settings.workers
+                else in_threads(database, gauges)
             )
             queue = JobQueue(database, settings, _kinds(database, workers))
             least = {"least_disk": settings.least_free_mb * MIB, "least_memory": settings.least_memory_mb * MIB}

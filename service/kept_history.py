@@ -132,7 +132,7 @@ def _events(
 ) -> tuple[list[Event], list[Event]]:
     """The accepted runs as events, with mean COF as corrected by the model in force, and the held runs with the mean
     COFs that they would have; only runs with keys `beyond` that one."""
-    runs.refuse_damaged(connection, row.clutch_id, beyond)
+    runs.refuse_damaged_runs(connection, row.clutch_id, beyond)
     cofs = results.cofs_of(connection, row.clutch_id, beyond)
     corrected, new_levels = assumptions.corrected_cofs_of(connection, row.clutch_id, beyond), _new_levels(row)
     accepted, held = [], []

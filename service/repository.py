@@ -60,7 +60,6 @@ from service.logging import request_id
 from service.settings import CODE_VERSION
 from storage import assumptions, changes, clutches, diagnoses, inspections, jobs, raw_columns, results, rigs, runs
 from storage.blobs import raw_stores
-from storage.checksums import allow_damage
 from storage.clutches import ClutchRow
 from storage.diagnoses import DiagnosisRow, VerdictRow
 from storage.encoding import Json
@@ -70,6 +69,7 @@ from storage.inspections import InspectionRow, PhotographRow
 from storage.jobs import JobRow
 from storage.results import FilterStateRow, FitRow, PredictionRow
 from storage.rigs import RigRow
+from storage.rows import allow_damage
 from storage.runs import RunRow
 
 if TYPE_CHECKING:

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 from sqlalchemy import Connection, delete, func, or_, select
 
-from storage.checksums import amend
-from storage.dialects import among, newest_first, upsert
-from storage.encoding import Json, Rows, to_text
+from storage.dialects import among, newest_first
+from storage.encoding import Json, to_text
+from storage.rows import Rows, amend, upsert
 from storage.tables import NOT_CLEARED, alarm, alarm_event, run
 
 RAISED, ACKNOWLEDGED, CLEARED = "raised", "acknowledged", "cleared"

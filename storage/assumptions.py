@@ -9,9 +9,9 @@ from typing import Any, TypeAlias
 
 from sqlalchemy import Connection, Select, delete, func, select
 
-from storage.checksums import allows_damage, refuse_damaged, sealed
 from storage.dialects import json_length
-from storage.encoding import Json, Rows, to_list, to_text
+from storage.encoding import Json, to_list, to_text
+from storage.rows import Rows, allows_damage, refuse_damaged, sealed
 from storage.tables import adopted_model, corrected_cof, fleet_prior, run
 
 # --- adopted models ---

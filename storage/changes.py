@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 from sqlalchemy import Connection, func, select
 
-from storage.checksums import sealed
 from storage.dialects import newest_first
-from storage.encoding import Json, Rows, to_text
+from storage.encoding import Json, to_text
+from storage.rows import Rows, sealed
 from storage.tables import change
 
 HOLD, CONFIRM, WITHDRAW, RESTORE, CORRECT = "hold", "confirm", "withdraw", "restore", "correct"

@@ -6,10 +6,10 @@ from typing import Any
 
 from sqlalchemy import ColumnElement, Connection, Select, case, func, select
 
-from storage.checksums import amend
 from storage.dialects import among, json_fields
-from storage.encoding import Json, Rows, to_text
+from storage.encoding import Json, to_text
 from storage.engine.errors import DamagedData
+from storage.rows import Rows, amend
 from storage.tables import HELD_ONLY, NOT_CLEARED, alarm_event, clutch, run
 
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 from sqlalchemy import Connection, func, select
 
-from storage.checksums import amend
 from storage.dialects import json_fields, newest_first
-from storage.encoding import Json, Rows, to_object
+from storage.encoding import Json, to_object
+from storage.rows import Rows, amend
 from storage.runs import ACCEPTED
 from storage.tables import adopted_model, diagnosis, run
 

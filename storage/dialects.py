@@ -6,11 +6,9 @@ JSON is text in both. Text is ordered by its code points in both, numbers are 64
 import json
 import math
 from collections.abc import Sequence
-from functools import cache
 from typing import Any
 
 import sqlalchemy as sa
-from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.ext.compiler import compiles
 from sqlalchemy.sql.compiler import SQLCompiler
 from sqlalchemy.sql.functions import FunctionElement
@@ -100,20 +98,6 @@ def newest_first(
     if before is not None:
         query = query.where(key < sa.literal(before, sa.Double))
     return query.order_by(key.desc()).limit(limit)
-
-
-def upsert(connection: sa.Connection, table: sa.Table, rows: Sequence[dict[str, Any]]) -> None:
-    """Store rows, replacing those with the same primary key."""
-    if rows:
-        connection.execute(_upsert(table, connection.dialect.name), rows)
-
-
-@cache
-def _upsert(table: sa.Table, dialect: str) -> sa.Insert:
-    insert: sqlite.Insert | postgresql.Insert
-    insert = sqlite.insert(table) if dialect == "sqlite" else postgresql.insert(table)
-    values = {column.name: insert.excluded[column.name] for column in table.columns if not column.primary_key}
-    return insert.on_conflict_do_update(index_elements=list(table.primary_key), set_=values)
 
 
 def _sqlite_path(path: Sequence[str | int]) -> str:

@@ -24,9 +24,6 @@ once: it is the double nearest to the decimal. A column that holds any other dou
     rows that are minus zero, which k does not distinguish from zero (4 bytes each)
 
 JSON in text columns is compact, and without NaN or infinities: the library's functions, nothing of our own at every row.
-
-`Rows` makes values of rows and rows of values: the type of a dataclass' field says how its column is stored. A JSON object,
-a list or a tuple is JSON text, named arrays are packed, a flag is 0 or 1; all else is stored as it is.
 """
 
 import json
@@ -34,16 +31,11 @@ import math
 import struct
 import zlib
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
-from operator import itemgetter
-from types import UnionType
-from typing import Any, Generic, TypeAlias, TypeVar, get_args, get_origin, get_type_hints
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-from sqlalchemy import Result, Row, Table
 
-from storage import checksums
 from storage.engine.errors import DamagedData
 
 CODEC = "shuffle-zlib"
@@ -291,76 +283,3 @@ to_text: Callable[[object], str] = json.JSONEncoder(allow_nan=False, ensure_asci
 to_object: Callable[[str], Json] = json.loads
 #: The list that `to_text` wrote.
 to_list: Callable[[str], list[Any]] = json.loads
-
-
-Value = TypeVar("Value")
-_Coding = tuple[Callable[[Any], Any], Callable[[Any], Any]]
-_of_list: _Coding = (to_text, lambda text: tuple(to_list(text)))
-_CODINGS: dict[Any, _Coding] = {
-    dict: (to_text, to_object),
-    tuple: _of_list,
-    Sequence: _of_list,
-    Mapping: (pack, partial(unpack, booleans=True)),
-    bool: (int, bool),
-}
-
-
-class Rows(Generic[Value]):
-    """Conversion between a dataclass and its rows, which may have other columns too; the database assigns the `key`.
-
-    Complete rows `of` a table have a checksum, and are `checked` for it when they are read.
-    """
-
-    def __init__(self, kind: type[Value], *, key: str = "", of: Table | None = None, checked: bool = True) -> None:
-        self._kind, self._key, self._of, self._checked = kind, key, of, checked
-        hints = get_type_hints(kind)
-        self.names = tuple(hints)
-        codings = {name: _coding(hint) for name, hint in hints.items()}
-        self._coded = {name: coding for name, coding in codings.items() if coding is not None}
-
-    def values(self, value: Value, **others: object) -> dict[str, Any]:
-        """A value's columns by name, without its key; `others` replace or complement the value's own."""
-        values = self.columns(**{name: getattr(value, name) for name in self.names if name != self._key}) | others
-        return values if self._of is None else checksums.sealed(self._of, values)
-
-    def columns(self, **fields: object) -> dict[str, Any]:
-        """Some fields in the form of their columns."""
-        for name in self._coded.keys() & fields.keys():
-            fields[name] = None if fields[name] is None else self._coded[name][0](fields[name])
-        return fields
-
-    def reader(self, rows: Result[*tuple[Any, ...]]) -> Callable[[Row[*tuple[Any, ...]]], Value]:
-        """A function that converts these rows to values; the positions of the fields are looked up once. Raises
-        DamagedData; if damage is allowed, a field that cannot be decoded is empty instead."""
-        columns = list(rows.keys())
-        fields_of = itemgetter(*map(columns.index, self.names))
-        table = self._of
-        damage_allowed = table is not None and checksums.allows_damage(rows, table)
-
-        def of(row: Row[*tuple[Any, ...]]) -> Value:
-            if table is not None and self._checked and not damage_allowed:
-                checksums.refuse_damaged(table, dict(zip(columns, row, strict=True)))
-            fields = dict(zip(self.names, fields_of(row), strict=True))
-            for name, (_, decode) in self._coded.items():
-                try:
-                    fields[name] = None if fields[name] is None else decode(fields[name])
-                except ValueError as error:
-                    if not damage_allowed:
-                        raise DamagedData(f"{name} of a {self._kind.__name__} cannot be read: {error}") from error
-                    fields[name] = {}
-            return self._kind(**fields)
-
-        return of
-
-    def all(self, rows: Result[*tuple[Any, ...]]) -> list[Value]:
-        return list(map(self.reader(rows), rows))
-
-    def first(self, rows: Result[*tuple[Any, ...]]) -> Value | None:
-        of, row = self.reader(rows), rows.first()
-        return None if row is None else of(row)
-
-
-def _coding(hint: Any) -> _Coding | None:
-    """A field's conversion to its column and back; None if the field is stored unchanged."""
-    kinds = get_args(hint) if get_origin(hint) is UnionType else (hint,)
-    return next((_CODINGS[plain] for kind in kinds if (plain := get_origin(kind) or kind) in _CODINGS), None)

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 from sqlalchemy import Connection, LargeBinary, func, literal_column, select, tuple_
 
-from storage.checksums import amend
 from storage.dialects import among
-from storage.encoding import Json, Rows
+from storage.encoding import Json
+from storage.rows import Rows, amend
 from storage.runs import ACCEPTED
 from storage.tables import inspection, inspection_photograph, photograph
 

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 from sqlalchemy import ColumnElement, Connection, and_, exists, func, or_, select, update
 
 from storage.dialects import among, newest_first
-from storage.encoding import Json, Rows, to_text
+from storage.encoding import Json, to_text
+from storage.rows import Rows
 from storage.tables import OPEN_ONLY, job
 
 WAITING, RUNNING, FINISHED, FAILED, CANCELLED = "waiting", "running", "finished", "failed", "cancelled"

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from sqlalchemy import Connection, exists, or_, select, update
 
-from storage.encoding import Rows
+from storage.rows import Rows
 from storage.tables import access_key
 
 

@@ -14,10 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 from sqlalchemy import Connection, Select, delete, select
 
-from storage.checksums import allows_damage, refuse_damaged
-from storage.dialects import upsert
-from storage.encoding import Json, Rows
+from storage.encoding import Json
 from storage.engine.errors import DamagedData
+from storage.rows import Rows, allows_damage, refuse_damaged, upsert
 from storage.tables import filter_state, fit, prediction, run
 
 # --- fits ---

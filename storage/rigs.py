@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 from sqlalchemy import Connection, select
 
-from storage.dialects import upsert
-from storage.encoding import Json, Rows
+from storage.encoding import Json
+from storage.rows import Rows, upsert
 from storage.tables import rig
 
 #: Profiles in memory at once. Chosen: one of a thousand columns is a quarter of a megabyte of JSON and some ten in memory.

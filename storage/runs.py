@@ -9,10 +9,9 @@ from typing import Any
 
 from sqlalchemy import ColumnElement, Connection, Select, TextClause, and_, exists, func, select, tuple_
 
-from storage import checksums
-from storage.checksums import amend
 from storage.dialects import DialectPair, json_text, json_value
-from storage.encoding import Json, Rows
+from storage.encoding import Json
+from storage.rows import Rows, allows_damage, amend, fails, refuse_damaged
 from storage.tables import HELD_ONLY, fit, run
 
 ACCEPTED, HELD, WITHDRAWN = "accepted", "held", "withdrawn"
@@ -195,19 +194,19 @@ def after_key(connection: Connection, clutch_id: str, run_key: int) -> list[RunI
     return _in_order(connection, clutch_id, run.c.run_key > run_key)
 
 
-def refuse_damaged(connection: Connection, clutch_id: str, beyond: int = 0) -> None:
+def refuse_damaged_runs(connection: Connection, clutch_id: str, beyond: int = 0) -> None:
     """Raise DamagedData if any run of a clutch with a key `beyond` that one fails its checksum, in any state. Queries
     of some columns cannot check it."""
     rows = connection.execute(_whole(clutch_id, beyond))
-    if not checksums.allows_damage(rows, run):
+    if not allows_damage(rows, run):
         for row in rows.mappings():
-            checksums.refuse_damaged(run, dict(row))
+            refuse_damaged(run, dict(row))
 
 
 def damaged(connection: Connection, clutch_id: str) -> set[str]:
     """The names of a clutch's runs that fail their checksums."""
     rows = connection.execute(_whole(clutch_id, 0)).mappings()
-    return {row["run_id"] for row in rows if checksums.fails(run, dict(row))}
+    return {row["run_id"] for row in rows if fails(run, dict(row))}
 
 
 def _whole(clutch_id: str, beyond: int) -> Select[Any]:

@@ -29,7 +29,7 @@ CHECKSUM = "checksum"
 
 
 def _checksum() -> Column[Any]:
-    """A column for the checksum of all other columns of a row (`storage.checksums`)."""
+    """A column for the checksum of all other columns of a row (`storage.rows`)."""
     return Column(CHECKSUM, WHOLE, nullable=False, server_default=text("0"))
 
 

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from sqlalchemy import Connection, delete, func, select, update
 
 from storage.dialects import newest_first, now_in_seconds
-from storage.encoding import Json, Rows
+from storage.encoding import Json
+from storage.rows import Rows
 from storage.tables import WAITING_ONLY, delivery, webhook
 
 WAITING, DELIVERED, FAILED = "waiting", "delivered", "failed"

@@ -23,13 +23,13 @@ from service.clutch.tracking import PREDICTED
 from service.errors import InvalidError
 from service.repository import content_now, decoded, inspection_hash
 from service.settings import CODE_VERSION
-from storage import checksums, inspections, raw_columns, results, runs
-from storage.checksums import allow_damage
+from storage import inspections, raw_columns, results, runs
 from storage.encoding import to_text
 from storage.engine.database import Database
 from storage.engine.errors import DamagedData, StorageError
 from storage.inspections import InspectionRow, PhotographRow
 from storage.raw_columns import Stored
+from storage.rows import allow_damage, findings
 from storage.runs import RunRow
 from storage.tables import CHECKSUM, metadata, run
 
@@ -106,7 +106,7 @@ def _unreadable(connection: Connection, chosen: Mapping[sa.Table, sa.ColumnEleme
     found = []
     for table, rows in chosen.items():
         try:
-            found += checksums.findings(connection, table, rows)
+            found += findings(connection, table, rows)
         except (StorageError, sa.exc.DBAPIError) as error:
             found.append(f"a row of {table.name} cannot be read: {error}")
     return found

@@ -30,9 +30,9 @@ from service.jobs.executor import Ended, Ending, Executor, in_rounds
 from service.settings import CODE_VERSION
 from storage import assumptions, clutches, jobs, results
 from storage.assumptions import NOBODY, FleetPriorRow
-from storage.checksums import allow_damage
 from storage.encoding import Json, to_object
 from storage.engine.database import Database
+from storage.rows import allow_damage
 
 #: Why a refresh leaves a clutch.
 LEFT = "not updated, because runs arrived during the computation: the next refresh updates it"

@@ -172,10 +172,8 @@ def _artefact(extension: Extension, run: StationaryRun, before: Campaign) -> Flo
     return artefact if artefact.any() else None
 
 
-def model_in_force(extension: Extension | None, life: Life | None, geometry: Geometry) -> ModelInForce:
-    """An extension as it applies to the tracking of a life; the baseline if none is adopted or no run has begun a life."""
-    if extension is None or life is None:
-        return ModelInForce()
+def model_in_force(extension: Extension, life: Life, geometry: Geometry) -> ModelInForce:
+    """An extension as it applies to the tracking of a life."""
     from models.diagnosis.report.corrections import corrections  # start-up time: it loads the whole diagnosis
 
     return ModelInForce(

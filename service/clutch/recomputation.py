@@ -20,7 +20,7 @@ from service.api.fleet import Kind
 from service.api.run import Evaluation, Loop, Warned
 from service.clutch import timeline
 from service.clutch.analysis import Analysis, LevelFit, loops_of, mean_cofs
-from service.clutch.assumptions import Assumptions, LearnedPrior, kind_of, severity_under
+from service.clutch.assumptions import Assumptions, LearnedPrior, ModelInForce, kind_of, severity_under
 from service.clutch.condition import SHOWN
 from service.clutch.diagnosis.campaign import head_of
 from service.clutch.incoming_run import IncomingRun
@@ -133,8 +133,10 @@ class ClutchHistory:
         return {field.name: getattr(self, field.name) for field in fields(self)}
 
     def assumptions_under(self, extension: Extension | None, life: timeline.Life | None) -> Assumptions:
-        """The assumptions for tracking a life if this extension were in force."""
-        model = model_in_force(extension, life, self.geometry)
+        """The assumptions for tracking a life if this extension were in force (None: the baseline)."""
+        model = ModelInForce()
+        if extension is not None and life is not None:
+            model = model_in_force(extension, life, self.geometry)
         severity = severity_under(self.record, model.severity_exponent)
         return Assumptions(severity=severity, prior=self.priors[severity], model=model)
 

@@ -14,9 +14,11 @@ from logging import shutdown
 from multiprocessing.connection import Connection
 from typing import Any
 
+from opentelemetry import propagate
+
 from service import logging
 from service.jobs.background import end_with_parent, keep_memory, use_one_blas_thread, yield_to_others
-from service.tracing import name_of, span_below
+from service.tracing import tracer
 from storage.engine.database import Database
 from storage.engine.opening import open_database
 
@@ -88,9 +90,9 @@ def main(
 def _answered(database: Database, message: bytes) -> tuple[Any, BaseException | None]:
     """A call's result, or its error with the traceback as a note."""
     try:
-        function, arguments, request, trace = pickle.loads(message)  # noqa: S301  (of our own service)
+        name, function, arguments, request, trace = pickle.loads(message)  # noqa: S301  (of our own service)
         logging.request_id.set(request)
-        with span_below(trace, name_of(function)):
+        with tracer.start_as_current_span(name, context=propagate.extract(trace)):
             return function(database, *arguments), None
     except BaseException as error:  # noqa: BLE001  (raised again for who asked)
         error.add_note("".join(traceback.format_exception(error)))

@@ -17,19 +17,26 @@ import threading
 import time
 from abc import ABC, abstractmethod
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Future, InvalidStateError
 from contextlib import suppress
 from dataclasses import dataclass, field
 from enum import Enum
+from functools import partial
 from multiprocessing import forkserver, resource_tracker
-from typing import Any
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+from opentelemetry import propagate
 
 from service.errors import BusyError
 from service.jobs import worker
 from service.logging import LogFormat, LogLevel, request_id
-from service.tracing import Carrier, carried, name_of, span_below
+from service.tracing import Carrier, tracer
 from storage.engine.database import Database
+
+if TYPE_CHECKING:
+    from prometheus_client import Gauge
 
 #: Calls of a lane that wait or run; more are refused as busy. Chosen: a minute of runs at 15 a second is 900. Of what takes
 #: a second or more a call (files that are read, simulations) so few that the last one is answered within a minute.
@@ -80,8 +87,9 @@ SECONDS = {
 _LONG = (Lane.SIMULATIONS, Lane.FILES)
 
 
-#: Hears how many calls of a lane wait or run, whenever that changes.
-Note = Callable[[Lane, int], None]
+#: Of each lane the gauge that shows how many of its calls wait or run; empty: none is shown.
+Gauges = Mapping[Lane, "Gauge"]
+NO_GAUGES: Gauges = MappingProxyType({})
 
 
 @dataclass(slots=True, eq=False, kw_only=True)
@@ -104,6 +112,14 @@ class _Call:
     begun: float | None = None
     retried: bool = False
     answer: "Future[Any]" = field(default_factory=Future)
+
+    @property
+    def name(self) -> str:
+        """The name of the function; for a partial, of the function within."""
+        function = self.function
+        while isinstance(function, partial):
+            function = function.func
+        return getattr(function, "__name__", type(function).__name__)
 
     def is_overdue(self, now: float) -> bool:
         """Whether the call is unanswered and has run for longer than allowed."""
@@ -142,11 +158,10 @@ class _Worker(ABC):
 class Workers:
     """The queues and workers of all lanes. `submit` may be called from any thread; `close` at the end."""
 
-    def __init__(self, make: Callable[[Lane], _Worker], sizes: dict[Lane, int], note: Note) -> None:
-        """`make` creates a worker of a lane; `sizes`: the maximum number of workers by lane; `note` is called at each
-        change of a lane's number of calls."""
+    def __init__(self, make: Callable[[Lane], _Worker], sizes: dict[Lane, int], gauges: Gauges) -> None:
+        """`make` creates a worker of a lane; `sizes`: the maximum number of workers by lane."""
         self._make = make
-        self._note = note
+        self._gauges = gauges
         self._sizes = sizes
         self._lock = threading.Lock()
         self._ready = {lane: threading.Condition(self._lock) for lane in Lane}
@@ -177,13 +192,15 @@ class Workers:
         `patience` [s] or runs for longer than `seconds` (default: of its lane). Raises BusyError if too many calls
         wait.
         """
+        trace: dict[str, str] = {}
+        propagate.inject(trace)
         call = _Call(
             lane=lane,
             function=function,
             arguments=arguments,
             turn=turn,
             request=request_id.get(),
-            trace=carried(),
+            trace=trace,
             seconds=SECONDS[lane] if seconds is None else seconds,
             patience=math.inf if lane is Lane.RENEWALS else patience,
         )
@@ -311,7 +328,8 @@ class Workers:
     def _count(self, lane: Lane, change: int) -> None:
         """Change a lane's count of waiting and running calls; the caller holds the lock."""
         self._calls[lane] += change
-        self._note(lane, self._calls[lane])
+        if lane in self._gauges:
+            self._gauges[lane].set(self._calls[lane])
 
     def _ended(self, call: _Call) -> None:
         """Queue the next call with the same `turn`; the caller holds the lock."""
@@ -395,7 +413,7 @@ class _Here(_Worker):
 
     def call(self, call: _Call) -> Any:
         request_id.set(call.request)
-        with span_below(call.trace, name_of(call.function)):
+        with tracer.start_as_current_span(call.name, context=propagate.extract(call.trace)):
             return call.function(self._database, *call.arguments)
 
 
@@ -417,7 +435,7 @@ class _WorkerProcess(_Worker):
 
     def call(self, call: _Call) -> Any:
         try:
-            self._line.send((call.function, call.arguments, call.request, call.trace))
+            self._line.send((call.name, call.function, call.arguments, call.request, call.trace))
             while not (message := self._receive()):
                 pass
         except (EOFError, OSError) as error:
@@ -549,7 +567,7 @@ def in_processes(
     database: Database,
     processes: int,
     log: tuple[LogFormat, LogLevel] = ("auto", "warning"),
-    note: Note = lambda _lane, _count: None,
+    gauges: Gauges = NO_GAUGES,
 ) -> Workers:
     """Workers in processes of their own, with this logging: `processes` for the lane of runs, one for each other lane."""
     starter = _Starter()
@@ -559,8 +577,8 @@ def in_processes(
         silence = 30 * _SILENCE if lane.value is None else _SILENCE
         return _WorkerProcess(starter, (database.url, lane.value, log), silence=silence)
 
-    return Workers(make, dict.fromkeys(Lane, 1) | {Lane.RUNS: processes}, note)
+    return Workers(make, dict.fromkeys(Lane, 1) | {Lane.RUNS: processes}, gauges)
 
 
-def in_threads(database: Database, note: Note = lambda _lane, _count: None) -> Workers:
-    return Workers(lambda _: _Here(database), dict.fromkeys(Lane, 1) | {Lane.RUNS: 2}, note)
+def in_threads(database: Database, gauges: Gauges = NO_GAUGES) -> Workers:
+    return Workers(lambda _: _Here(database), dict.fromkeys(Lane, 1) | {Lane.RUNS: 2}, gauges)

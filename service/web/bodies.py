@@ -1,17 +1,20 @@
-"""Bodies of requests: what a route takes, what all may hold together, and how long one may take.
+"""Bodies of requests: what a route takes, what all may hold together, how long one may take, and where it is kept.
 
 A route that takes more than short JSON says so where it stands (`takes`); what is not declared is short. Bytes are counted
 while they are held: what has no room is refused with 503.
 """
 
 import asyncio
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+import tempfile
+from collections.abc import AsyncIterable, AsyncIterator, Callable, Iterator, Mapping
+from contextlib import asynccontextmanager, contextmanager
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any, TypeVar
+from pathlib import Path
+from typing import IO, Any, TypeVar
 
-from fastapi.concurrency import run_in_threadpool
+from fastapi import Request
+from fastapi.concurrency import contextmanager_in_threadpool, run_in_threadpool
 from pydantic import BaseModel
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
@@ -55,6 +58,40 @@ async def parsed(schema: type[Content], body: bytes) -> Content:
     return await run_in_threadpool(checked, schema, body)
 
 
+@asynccontextmanager
+async def body_or_file(request: Request, folder: Path) -> AsyncIterator[bytes | Path]:
+    """Context with a request's body: in memory if short, else as a file in the folder, removed at the end."""
+    pieces, received = request.stream(), bytearray()
+    async for piece in pieces:
+        received += piece
+        if len(received) > limits.MAX_BYTES_IN_MEMORY:
+            break
+    else:
+        yield bytes(received)
+        return
+    async with contextmanager_in_threadpool(tempfile.NamedTemporaryFile(dir=folder)) as file:
+        await run_in_threadpool(file.write, received)
+        received.clear()
+        await written(pieces, file)
+        yield Path(file.name)
+
+
+async def written(pieces: AsyncIterable[bytes], file: IO[bytes]) -> None:
+    """Write the pieces to the file as they arrive, in a thread."""
+    gathered = bytearray()
+    async for piece in pieces:
+        gathered += piece
+        if len(gathered) >= limits.PIECE_BYTES:
+            await run_in_threadpool(file.write, bytes(gathered))
+            gathered.clear()
+    await run_in_threadpool(_end, file, bytes(gathered))
+
+
+def _end(file: IO[bytes], last: bytes) -> None:
+    file.write(last)
+    file.flush()
+
+
 class Room:
     """A budget of bytes that requests share."""
 
@@ -92,6 +129,10 @@ class Bound:
 
     most: int
     in_memory: int
+
+
+def _too_large(bound: Bound) -> TooLargeError:
+    return TooLargeError(f"a request may hold at most {bound.most} bytes here")
 
 
 class Bodies:
@@ -135,18 +176,17 @@ class Bodies:
             if whole:  # what comes now is that the caller has gone
                 return await receive()
             bound = self.bounds[declared.get(scope.get("endpoint", self), Takes.SHORT)]
-            too_large = TooLargeError(f"a request may hold at most {bound.most} bytes here")
             if begun is None:
                 begun = clock()
                 announced = dict(scope["headers"]).get(b"content-length", b"0")
                 if announced.isdigit() and int(announced) > bound.most:
-                    raise too_large
+                    raise _too_large(bound)
             while True:
                 message = await arrived(begun)
                 whole = not message.get("more_body", False)
                 has_room = body.grow(len(message.get("body", b"")), bound.in_memory)
                 if body.taken > bound.most:
-                    raise too_large
+                    raise _too_large(bound)
                 if has_room:
                     return message
                 if whole:

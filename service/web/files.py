@@ -8,7 +8,7 @@ import os
 import re
 import shutil
 import tempfile
-from collections.abc import AsyncIterable, AsyncIterator, Callable, Iterator, Mapping, Sequence
+from collections.abc import AsyncIterator, Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
 from contextlib import AbstractAsyncContextManager, asynccontextmanager, suppress
 from dataclasses import dataclass
@@ -25,8 +25,8 @@ from starlette.types import Receive, Scope, Send
 from service.api.rig import RigProfile
 from service.errors import BusyError, InvalidError, TooLargeError
 from service.runs.rig_profile import require_usable
-from service.web.bodies import Room, parsed
-from service.web.limits import COPIES_SHARE, MAX_BYTES_IN_MEMORY, MAX_FORM_TEXT_BYTES, PIECE_BYTES
+from service.web.bodies import Room, parsed, written
+from service.web.limits import COPIES_SHARE, MAX_FORM_TEXT_BYTES, PIECE_BYTES
 
 FILE_TYPE = "application/octet-stream"
 #: A file of any format, as the API's description has it, and as the body of a request.
@@ -48,43 +48,9 @@ def emptied_folder(database: Path | None) -> Path:
     return folder
 
 
-@asynccontextmanager
-async def body_or_file(request: Request, folder: Path) -> AsyncIterator[bytes | Path]:
-    """Context with a request's body: in memory if short, else as a file in the folder, removed at the end."""
-    pieces, received = request.stream(), bytearray()
-    async for piece in pieces:
-        received += piece
-        if len(received) > MAX_BYTES_IN_MEMORY:
-            break
-    else:
-        yield bytes(received)
-        return
-    async with contextmanager_in_threadpool(tempfile.NamedTemporaryFile(dir=folder)) as file:
-        await run_in_threadpool(file.write, received)
-        received.clear()
-        await written(pieces, file)
-        yield Path(file.name)
-
-
 def temporary_folder(folder: Path) -> AbstractAsyncContextManager[str]:
     """A subfolder that exists inside the context."""
     return contextmanager_in_threadpool(tempfile.TemporaryDirectory(dir=folder))
-
-
-async def written(pieces: AsyncIterable[bytes], file: IO[bytes]) -> None:
-    """Write the pieces to the file as they arrive, in a thread."""
-    gathered = bytearray()
-    async for piece in pieces:
-        gathered += piece
-        if len(gathered) >= PIECE_BYTES:
-            await run_in_threadpool(file.write, bytes(gathered))
-            gathered.clear()
-    await run_in_threadpool(_end, file, bytes(gathered))
-
-
-def _end(file: IO[bytes], last: bytes) -> None:
-    file.write(last)
-    file.flush()
 
 
 def is_form(request: Request) -> bool:

@@ -41,15 +41,9 @@ class Metrics:
         self.requests = Counter("clutchlife_requests", "Requests answered", labels, registry=self._registry)
         self.seconds = Histogram("clutchlife_request_seconds", "Time to answer", labels[:2], registry=self._registry)
         text = "Calls that wait or run"
-        self._calls = Gauge(
-            "clutchlife_worker_calls", text, ["lane"], registry=self._registry, multiprocess_mode="livesum"
-        )
-        for lane in Lane:
-            self.note_calls(lane, 0)
-
-    def note_calls(self, lane: Lane, count: int) -> None:
-        """Set the number of a lane's waiting and running calls in this process."""
-        self._calls.labels(lane.name.lower()).set(count)
+        calls = Gauge("clutchlife_worker_calls", text, ["lane"], registry=self._registry, multiprocess_mode="livesum")
+        #: The gauges of waiting and running calls in this process, by lane.
+        self.calls = {lane: calls.labels(lane.name.lower()) for lane in Lane}
 
     def exposition(self, database: Database) -> bytes:
         """All metrics as text, the clutches as they stand now."""

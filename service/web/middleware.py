@@ -16,6 +16,7 @@ from urllib.parse import urlsplit
 from fastapi.concurrency import run_in_threadpool
 from fastapi.dependencies.utils import request_params_to_args
 from fastapi.responses import Response
+from opentelemetry import propagate
 from opentelemetry.trace import Span, SpanKind
 from starlette.datastructures import Headers, MutableHeaders, QueryParams
 from starlette.middleware.gzip import GZipMiddleware
@@ -26,7 +27,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from service.answers.store import Again
 from service.errors import BusyError, InvalidError, ServiceError, TooLargeError, TooManyError, UnsupportedMediaTypeError
 from service.logging import access, log_request, request_id, sane
-from service.tracing import span_below
+from service.tracing import tracer
 from service.web import limits
 from service.web.auth import UNMATCHED, authorise, clutch_of, context_of, query_fields, route_of, snapshot_at
 from service.web.bodies import Room
@@ -163,7 +164,8 @@ class Edge(_OfRequests):
         sent = next((value for name, value in scope["headers"] if name == b"x-request-id"), b"")
         own_id = (sane(sent) if sent else None) or secrets.token_hex(8)
         request_id.set(own_id)
-        with span_below(Headers(scope=scope), scope["method"], SpanKind.SERVER) as span:
+        caller = propagate.extract(Headers(scope=scope))
+        with tracer.start_as_current_span(scope["method"], context=caller, kind=SpanKind.SERVER) as span:
             await self._answered(scope, receive, send, own_id, span)
 
     async def _answered(self, scope: Scope, receive: Receive, send: Send, own_id: str, span: Span) -> None:

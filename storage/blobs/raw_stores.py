@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 from sqlalchemy import ColumnElement, Connection, and_, delete, func, or_, select, update
 
-from storage.dialects import among, upsert
-from storage.encoding import Rows
+from storage.dialects import among
+from storage.rows import Rows, upsert
 from storage.tables import IN_A_STORE, channel, raw_removal, raw_store
 
 

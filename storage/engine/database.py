@@ -1,13 +1,16 @@
-"""The open database, of either kind: its transactions, cheap checks without one (`Watch`), and answers that services share.
+"""The open database, of either kind: its transactions, cheap checks without one (`Watch`), values kept in memory that were
+read from it (`Kept`), and answers that services share.
 
 Made by `opening`.
 """
 
 import asyncio
 import json
+import threading
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Sequence
+from collections import OrderedDict
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
@@ -20,7 +23,6 @@ from sqlalchemy import Connection
 from sqlalchemy.exc import OperationalError, ProgrammingError
 
 from storage.engine.errors import DatabaseTooOld, StorageError, StorageUnavailable
-from storage.engine.kept import Kept
 from storage.migrations.upgrade import current, head
 
 #: Spans of what writes, `store`: made where an SDK of OpenTelemetry is there.
@@ -161,6 +163,39 @@ class SharedAnswer:
     release: str
     revision: int
     body: bytes
+
+
+class Kept:
+    """A cache by name of values read from a database, in the memory of this process; the least recently used go first.
+
+    Threads share it, and a value is never changed in place. Whoever keeps a value keeps with it what shows that the database
+    still gives it: a clutch's revision.
+    """
+
+    def __init__(self, most_bytes: int) -> None:
+        self._most_bytes = most_bytes
+        self._lock = threading.Lock()
+        self._values: OrderedDict[Hashable, tuple[Any, int]] = OrderedDict()
+        self._bytes = 0
+
+    def get(self, name: Hashable) -> Any:
+        """The value cached under a name, else None."""
+        with self._lock:
+            if name not in self._values:
+                return None
+            self._values.move_to_end(name)
+            return self._values[name][0]
+
+    def put(self, name: Hashable, value: object, size: int) -> None:
+        """Cache a value of about `size` bytes, replacing the one of that name, unless it exceeds the cache's limit."""
+        with self._lock:
+            self._bytes -= self._values.pop(name, (None, 0))[1]
+            if size > self._most_bytes:
+                return
+            self._values[name] = value, size
+            self._bytes += size
+            while self._bytes > self._most_bytes:
+                self._bytes -= self._values.popitem(last=False)[1][1]
 
 
 def kept_of(connection: Connection) -> Kept | None:

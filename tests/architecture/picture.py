@@ -13,7 +13,7 @@ from tests.architecture.source import PACKAGES, ROOT, by_name, first_sentence, i
 
 PICTURE = ROOT / "docs" / "figures" / "architecture.svg"
 #: Files directly in storage hold the rows of one table each: one box, but for those that folders of storage import.
-ROWS, OTHERS = "storage.rows", ("storage.tables", "storage.dialects", "storage.encoding", "storage.checksums")
+ROWS, OTHERS = "storage.each_table", ("storage.tables", "storage.dialects", "storage.encoding", "storage.rows")
 DIAGNOSIS = "models.diagnosis"
 
 Edges = Mapping[str, frozenset[str]]

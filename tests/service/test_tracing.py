@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from opentelemetry import trace
+from opentelemetry import propagate, trace
 from opentelemetry.trace import NonRecordingSpan, SpanContext, TraceFlags
 
 from service.jobs import worker
-from service.tracing import carried, span_below
+from service.tracing import tracer as tracer_of_service
 from storage.engine.opening import open_database
 from tests.service.clients import client_on
 from tests.support import stationary
@@ -90,14 +90,21 @@ def test_tracking_and_storing_are_below_the_request_and_that_below_its_caller(tm
     }
 
 
+def _sent() -> dict[str, str]:
+    """What goes along with a call of the present span."""
+    carrier: dict[str, str] = {}
+    propagate.inject(carrier)
+    return carrier
+
+
 def _named(_: Any) -> str:
-    return str(carried()["traceparent"])
+    return _sent()["traceparent"]
 
 
 def test_the_span_of_a_request_goes_along_to_the_worker_s_process(tmp_path: Path, tracer: _Tracer) -> None:
     database = open_database(f"sqlite:///{tmp_path}/a.db")
-    with span_below({"traceparent": CALLER}, "request"):
-        message = pickle.dumps((partial(_named), (), "id", carried()))
+    with tracer_of_service.start_as_current_span("request", context=propagate.extract({"traceparent": CALLER})):
+        message = pickle.dumps(("_named", partial(_named), (), "id", _sent()))
     answer, error = worker._answered(database, message)
     database.close()
     assert error is None
@@ -106,5 +113,5 @@ def test_the_span_of_a_request_goes_along_to_the_worker_s_process(tmp_path: Path
 
 
 def test_without_an_sdk_nothing_goes_along() -> None:
-    with span_below({}, "request"):
-        assert carried() == {}
+    with tracer_of_service.start_as_current_span("request"):
+        assert _sent() == {}

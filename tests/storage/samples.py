@@ -16,13 +16,13 @@ from numpy.typing import NDArray
 from sqlalchemy import Connection, text, true
 
 from storage import clutches, raw_columns, results, runs
-from storage.checksums import allow_damage, amend
 from storage.clutches import ClutchRow
 from storage.diagnoses import DiagnosisRow
 from storage.engine.database import Database
 from storage.engine.opening import open_database
 from storage.migrations import upgrade as migrations
 from storage.results import FitRow
+from storage.rows import allow_damage, amend
 from storage.runs import RunRow
 from storage.tables import CHECKSUM, clutch, metadata
 

@@ -42,7 +42,7 @@ from service.runs.suggestion import confirmed_profile
 from service.runs.upload import read_file_run
 from service.web import files, responses
 from service.web.auth import Ingester, Reader, grant_of
-from service.web.bodies import Takes, takes
+from service.web.bodies import Takes, body_or_file, takes
 from service.web.context import Context
 from service.web.limits import LARGE_BODY_BYTES
 from service.web.problems import READING, SENDING, described
@@ -184,7 +184,7 @@ async def post_run(request: Request, context: Ingester, clutch_id: parameters.Cl
     """Post a run, in any order of cycles. The receipt has the results. When you get it, the run is stored for good."""
     responses.require_json(request)
     by = grant_of(request).name
-    async with files.body_or_file(request, context.folder) as body:
+    async with body_or_file(request, context.folder) as body:
         is_short = isinstance(body, bytes) and len(body) <= LARGE_BODY_BYTES
         taken_in = context.workers.submit(
             Lane.RUNS if is_short else Lane.RECORDS,

@@ -1,4 +1,4 @@
-"""Rows of what is stored of clutches have a checksum of all their other columns (`storage.checksums`).
+"""Rows of what is stored of clutches have a checksum of all their other columns (`storage.rows`).
 
 Those that are there get that of what they hold now.
 """

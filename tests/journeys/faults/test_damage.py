@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 import sqlalchemy as sa
 
-from storage import checksums
+from storage.rows import covered
 from storage.tables import CHECKSUM, metadata
 from tests.service.clients import client_of, client_on, clutchlife
 from tests.support import post_tests, stationary
@@ -64,7 +64,7 @@ def changed_somewhere(path: Path, rng: random.Random) -> str:
     with closing(sqlite3.connect(path)) as connection, connection:
         while True:
             table = rng.choice(tables)
-            column, _ = rng.choice(checksums.covered(table))
+            column, _ = rng.choice(covered(table))
             if not {"clutch_id", "run_key"} & set(table.c.keys()) or column in table.primary_key.columns:
                 continue
             name, where = table.name, OF_CLUTCH if "clutch_id" in table.c else OF_RUN

@@ -12,10 +12,10 @@ from service.changes.edit_clutch import register
 from service.changes.ingest_run import ingest
 from service.runs.json_run import read_run
 from service.runs.simulated import simulated_body
-from storage.checksums import of_values
 from storage.dialects import TEXT
 from storage.engine.opening import open_database
 from storage.results import states_sum
+from storage.rows import of_values
 from storage.tables import CHECKSUM, change, channel, clutch, filter_state, metadata, prediction, run
 
 AT = "2026-01-01T00:00:00+00:00"

@@ -8,8 +8,7 @@ import pytest
 from service import kept_history, repository
 from service.kept_history import KeptHistory
 from storage import clutches, runs
-from storage.engine.database import Database
-from storage.engine.kept import Kept
+from storage.engine.database import Database, Kept
 from storage.engine.opening import open_database
 from tests.service.changes.benches import CLUTCH, Bench, body, send_to
 

@@ -82,7 +82,6 @@ def small(database_url: str, monkeypatch: pytest.MonkeyPatch) -> Any:
     """A service in which a body of 50 kB is long, and all together may have 100 kB in memory."""
     monkeypatch.setattr(limits, "MAX_BODIES_IN_MEMORY", 100_000)
     monkeypatch.setattr(limits, "MAX_BYTES_IN_MEMORY", 50_000)
-    monkeypatch.setattr("service.web.files.MAX_BYTES_IN_MEMORY", 50_000)
     with client_on(database_url) as client:
         assert client.post("/v1/clutches", json={"clutch_id": "c1"}).status_code == 201
         yield client

@@ -108,7 +108,7 @@ from service.web.metrics import Metrics
 from storage.engine.opening import open_database
 metrics = Metrics()
 metrics.requests.labels("GET", "/a", "200").inc(2)
-metrics.note_calls(Lane.RUNS, 3)
+metrics.calls[Lane.RUNS].set(3)
 print(metrics.exposition(open_database(sys.argv[1])).decode() + "\\n", flush=True)
 sys.stdin.read()
 """

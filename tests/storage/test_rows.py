@@ -6,11 +6,11 @@ import pytest
 import sqlalchemy as sa
 from sqlalchemy import Connection
 
-from storage import alarms, checksums, clutches, results
+from storage import alarms, clutches, results
 from storage.alarms import AlarmRow
-from storage.checksums import allow_damage, amend, findings
 from storage.engine.errors import DamagedData
 from storage.results import FilterStateRow, PredictionRow
+from storage.rows import allow_damage, amend, covered, findings, refuse_damaged, sealed
 from storage.tables import CHECKSUM, alarm, clutch, metadata, prediction
 from tests.storage.samples import CLUTCH, clutch_row, fit_row, store_run
 
@@ -30,14 +30,14 @@ def test_any_column_that_changes_is_found(table: sa.Table) -> None:
         return b"a" if isinstance(kind, sa.LargeBinary) else "a" if isinstance(kind, sa.Text) else 1
 
     row = {column.name: value(column.type) for column in table.columns if column.name != CHECKSUM}
-    checksums.refuse_damaged(table, checksums.sealed(table, row))
-    for name, _ in checksums.covered(table):
+    refuse_damaged(table, sealed(table, row))
+    for name, _ in covered(table):
         for other in (None, b"b" if row[name] == b"a" else "b" if row[name] == "a" else 2):
             with pytest.raises(DamagedData, match=f"{table.name} .* is not what was stored"):
-                checksums.refuse_damaged(table, checksums.sealed(table, row) | {name: other})
+                refuse_damaged(table, sealed(table, row) | {name: other})
     (key, *others) = table.primary_key
     given = not others and isinstance(key.type, sa.Integer)
-    assert {name for name, _ in checksums.covered(table)} == row.keys() - ({key.name} if given else set())
+    assert {name for name, _ in covered(table)} == row.keys() - ({key.name} if given else set())
 
 
 def test_a_damaged_rule_or_receiver_keeps_no_run_out(connection: Connection) -> None:
