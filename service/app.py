@@ -74,6 +74,7 @@ def create_app(settings: Settings) -> FastAPI:
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
+        """Context of the running service: opens the database, starts its threads and processes, and ends them at last."""
         with service_lock(settings.database):
             database = open_database(settings.database, serving=True)
             raw_records.use(database, settings.raw)

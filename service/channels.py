@@ -94,6 +94,7 @@ class _Errors:
         self.kept, self.total, self._line_of = kept, len(kept), line_of
 
     def add_row(self, name: str, index: int, value: object, code: str, rule: str) -> None:
+        """Count an error of one value, and keep it if there is room."""
         self.total += 1
         if len(self.kept) >= MAX_ERRORS:
             return
@@ -126,6 +127,7 @@ def check_columns(
 
 
 def _wrong_lengths(columns: Mapping[str, Sequence[Any] | FloatArray]) -> list[FieldError]:
+    """An error for each channel that is empty or shorter than the longest one."""
     errors = []
     rows = max((len(values) for values in columns.values()), default=0)
     for name, values in columns.items():
@@ -139,6 +141,7 @@ def _wrong_lengths(columns: Mapping[str, Sequence[Any] | FloatArray]) -> list[Fi
 
 
 def _numbers(name: str, values: Sequence[Any], errors: _Errors) -> FloatArray | None:
+    """The values as 64-bit floats; None, with each wrong row added to `errors`, if some are not numbers or too large."""
     if not set(map(type, values)) <= {int, float}:
         for index, value in enumerate(values):
             if type(value) not in (int, float):
@@ -154,6 +157,7 @@ def _numbers(name: str, values: Sequence[Any], errors: _Errors) -> FloatArray | 
 
 
 def _check_range(name: str, column: FloatArray, errors: _Errors, *, sampled: bool) -> None:
+    """Add an error for each value of a column outside its channel's valid range."""
     channel = CHANNELS[name]
     least = SAMPLED_LEAST.get(name, channel.least) if sampled else channel.least
     if least <= column.min(initial=least) and column.max(initial=least) <= channel.most:

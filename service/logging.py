@@ -116,6 +116,7 @@ class Queued(logging.Handler):
         return (self.format(record) + "\n").encode(self._encoding, "backslashreplace")
 
     def _write_all(self) -> None:
+        """The loop of the writing thread: writes lines as the reader takes them; a full disk is tried again."""
         while True:
             with self._changed:
                 self._changed.wait_for(lambda: self._lines)
@@ -147,6 +148,7 @@ def _file_of(stream: TextIO) -> int:
 
 
 def _of_dropped(number: int) -> logging.LogRecord:
+    """The log record that says how many lines were dropped."""
     message = "%d lines of the log were dropped here: nobody took them"
     return logging.LogRecord("clutchlife", logging.WARNING, __file__, 0, message, (number,), None)
 

@@ -371,6 +371,7 @@ def ask_fleet_refresh(connection: Connection, kind: Kind | None, *, by: str, at:
 
 
 def _store_tracking(connection: Connection, clutch_id: str, tracking: Tracking) -> None:
+    """Replace the stored filter states of a clutch, and add its new predictions."""
     if tracking.again:
         results.clear_predictions(connection, clutch_id)
     made: dict[str, Any] = {"pressure": ALL_PRESSURES, "code_version": CODE_VERSION}
@@ -395,6 +396,8 @@ def states_finding(connection: Connection, row: ClutchRow) -> str | None:
 
 
 def _filters(connection: Connection, row: ClutchRow) -> States | None:
+    """The stored filter states; None if they are damaged or of another release, so that the clutch is tracked from its
+    runs."""
     try:
         rows = {method: row for (method, _), row in results.filter_states_of(connection, row.clutch_id).items()}
     except DamagedData as error:
@@ -670,6 +673,7 @@ def _refuse_changed(database: Database, row: RunRow) -> None:
 
 
 def incoming(row: RunRow, columns: Mapping[str, NDArray[np.float64]]) -> IncomingRun:
+    """A stored run as it was sent, with the given channels."""
     return IncomingRun(
         kind=row.kind,
         cycles=row.cycles,

@@ -103,6 +103,7 @@ def _drive_of(slip: SlipRecord, speed: float) -> Drive | None:
 
 
 def _profile_of(slip: SlipRecord, maximum: float, origin: float, duration: float, moments: int) -> RecordedPressure:
+    """The recorded pressure from contact to the last sample, at `moments` points for each `duration` [s]."""
     before = slip.pressure[slip.between(origin, slip.contact)]
     plateau = float(np.median(before)) if before.size else 0.0
     last = float(slip.time[-1])

@@ -145,6 +145,7 @@ def _friction(slip: SlipRecord, per_pascal: float, rows: NDArray[np.bool_]) -> S
 
 
 def _ratio(value: ValueWithError | None, reference: ValueWithError | None) -> ValueWithError | None:
+    """The ratio of two values with its error; None if either is missing."""
     return None if value is None or reference is None else value.over(reference)
 
 
@@ -167,6 +168,7 @@ def _energy(slip: SlipRecord, channels: _Channels) -> ValueWithError:
 
 
 def _peak_power(slip: SlipRecord) -> ValueWithError | None:
+    """The highest friction power [W] between contact and the end of slip, smoothed; None if samples are too few."""
     rows = slip.between(slip.contact, slip.end.value)
     power = channel_of(slip.time[rows], (slip.torque * slip.speed)[rows])
     first, last = power.time[[0, -1]].tolist()

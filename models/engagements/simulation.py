@@ -39,6 +39,8 @@ def capacity_of(parameters: Mapping[float, StribeckParameters]) -> Capacity:
     laws = laws_of(levels, columns) if levels.size >= FEWEST_PRESSURES else None
 
     def capacity(pressure: float, velocity: float) -> float:
+        """Torque [Nm] that the clutch can carry at a pressure [Pa] and sliding velocity [m/s]: by the pressure laws, or
+        by the curve of the nearest level."""
         curve_pressure = max(pressure, float(levels[0]))
         if laws is None:
             curve_pressure = float(levels[np.argmin(np.abs(levels - pressure))])

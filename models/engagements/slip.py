@@ -216,6 +216,7 @@ class _Rest:
 
 
 def _rest_of(power: int, time: FloatArray, speed: FloatArray, earliest: float, latest: float) -> _Rest:
+    """The end of slip by least squares: speed is a polynomial of `power` up to the end, and constant after it."""
     from scipy.optimize import minimize_scalar  # start-up time: only a raw record of an engagement has an end of slip
 
     span = latest - earliest
@@ -316,6 +317,7 @@ def slip_of(record: Record) -> SlipRecord | Refusal:
 
 
 def _unusable(record: Record) -> Refusal | None:
+    """Why no slip can be found in a record; None if there is no reason."""
     size = record.time.size
     if size < criteria.FEWEST_SAMPLES:
         rule = f"a record must have at least {criteria.FEWEST_SAMPLES} samples, got {size}"
@@ -384,6 +386,7 @@ def _contact_of(time: FloatArray, torque: FloatArray, slowing: int) -> _Contact 
 
 
 def _crossings(time: FloatArray, torque: FloatArray, highest: float) -> tuple[float, float, float]:
+    """The times [s] at which torque rises through 5 %, through START and through 20 % of its highest value."""
     below, start, above = (
         crossing(time, torque > share * highest)
         for share in (0.05, criteria.START, 0.20)  # 5 and 20 % of a torque that rises over the whole slip
@@ -400,6 +403,7 @@ def crossing(time: FloatArray, above: NDArray[np.bool_]) -> float:
 
 
 def _start_of(time: FloatArray, torque: FloatArray, highest: float, zero: ValueWithError) -> _Contact:
+    """The start of torque: where a line through its rise passes a share of the highest torque, and where it meets zero."""
     below, start, above = _crossings(time, torque, highest)
     rows = (time >= below) & (time <= above)
     step = float(np.median(np.diff(time)))

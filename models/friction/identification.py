@@ -313,6 +313,7 @@ def mean_torques(fits: Sequence[StribeckFit], velocities: FloatArray, raised: Fl
 
 
 def _fold(curve: Curve) -> _Folded:
+    """A curve with speed and torque in units of their largest, both directions folded onto one. Raises ValueError."""
     velocity, measured, sd = curve.velocity, curve.torque, curve.torque_sd
     if measured.ndim != 1 or measured.size == 0:
         raise ValueError(f"torque must be a column with at least one row, got shape {measured.shape}")
@@ -343,6 +344,7 @@ def _fold(curve: Curve) -> _Folded:
 
 
 def _fit_batch(folded: Sequence[_Folded]) -> list[StribeckFit]:
+    """The fits of several curves, computed together as padded rows."""
     shape = (len(folded), max(curve.speed.size for curve in folded))
     speed, measured, weight = np.ones(shape), np.zeros(shape), np.zeros(shape)
     for row, curve in enumerate(folded):
@@ -399,6 +401,7 @@ def _describe(
     noise: FitNoise,
     uncertainties: Uncertainty,
 ) -> StribeckFit:
+    """The fit of one row of a batch, in physical units, with its uncertainty, status and message."""
     a, b, c = optimum.coefficients[row, 0].tolist()
     v_s = math.exp(optimum.log_velocity[row, 0])
     fastest = 1.0 if folded.speed.any() else 0.0

@@ -255,9 +255,11 @@ class _Posed:
         return middle, (high - low) / (2 * step)
 
     def without(self, column: FloatArray) -> FloatArray:
+        """A column [n] without what the absorbed shapes explain."""
         return np.asarray(column - self.absorbed @ (self.absorbed.T @ column), dtype=np.float64)
 
     def gain(self, left: FloatArray) -> float:
+        """The factor of a projected course that fits the torque best, shrunk towards 1."""
         weight = (self.noise / GAIN_SD) ** 2
         return float((left @ self.left + weight) / (left @ left + weight))
 
@@ -367,6 +369,7 @@ class _Posed:
         return math.sqrt(variance * (ratio if ratio > 1 + NOT_WHITE * math.sqrt(2 / freedom) else 1.0))
 
     def result(self, course: FloatArray, lag: float | None, estimate: _Estimate, status: LagStatus) -> LagFit:
+        """The fit at a lag [s], at which the law gives the torque `course` [n], with its log likelihood."""
         left = self.without(course)
         miss = float(np.square(self.left - self.gain(left) * left).sum())
         size = self.measured.size

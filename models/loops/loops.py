@@ -68,6 +68,7 @@ def evaluate_loops(
 
 
 def _nearest(stationary: Mapping[float, StationaryCurve] | None, pressure: float) -> StationaryCurve | None:
+    """The stationary curve of the same pressure level; None if none is near enough."""
     if not stationary:
         return None
     level = min(stationary, key=lambda candidate: abs(candidate - pressure))
@@ -81,6 +82,7 @@ def _loop(
     torque: FloatArray,
     curve: StationaryCurve | None,
 ) -> FrictionLoop:
+    """The friction loop of one pressure level: its area, and the lags of both laws beside a stationary curve."""
     if np.median(velocity) < 0:  # the same swing in the other direction: the model is odd, the area unchanged
         velocity, torque = -velocity, -torque
     cycle = fit_cycle(time, velocity)

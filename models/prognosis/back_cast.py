@@ -66,8 +66,8 @@ class BackCast:
         return _power(-self.misses), _power(self.misses)
 
     def judged(self, test: Measurement) -> "BackCast":
-        """The value with the miss of one more test added, if a kept forecast reaches the test and no event lies
-        between."""
+        """This count with the miss of one more test added: how far the test lies from the forecast that was kept for it,
+        in half widths of its interval. Unchanged if no forecast reaches the test or an event lies between."""
         progress, epoch = self.forecasts[:, 0], self.forecasts[:, 1]
         usable = (
             (progress > 0.0)

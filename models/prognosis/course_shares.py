@@ -52,6 +52,7 @@ def course_shares(posterior: TrackPosterior) -> list[CourseProbability]:
 
 
 def _order(posterior: TrackPosterior, here: NDArray[np.bool_]) -> float | None:
+    """The median order 1 + 1/ε of the draws of these courses; None if none has an order."""
     ordered = here & (posterior.course != CourseForm.LOGARITHM)
     if not posterior.weight[ordered].any():
         return None

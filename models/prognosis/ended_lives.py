@@ -97,6 +97,7 @@ class ObservedLife:
         return np.where(share > 1.0, 1.0 + self.final_pace * (share - 1.0), self._inside(share))
 
     def _inside(self, share: FloatArray) -> FloatArray:
+        """Damage at shares of the life up to 1, straight between its tests."""
         shares = np.append(np.array(self.progress) / self.end, 1.0)
         return np.asarray(np.interp(share, shares, np.append(self.damage, 1.0)))
 
@@ -153,6 +154,7 @@ def new_and_laws(history: Sequence[Measurement]) -> tuple[float, tuple[float, ..
 
 
 def _drawn(history: Sequence[Measurement]) -> TrackPosterior:
+    """500 draws of eq. 6's coefficients from the exact posterior under the weak prior."""
     prior = weak(history[0], falling=True)
     return _GRID.posterior(_GRID.from_history(prior, history), 500, np.random.default_rng(0))
 
@@ -254,6 +256,8 @@ def as_its_kind(
 def _as_its_kind(
     tests: tuple[Measurement, ...], as_of: float, lives: tuple[ObservedLife, ...], offset: tuple[float, ...] | None
 ) -> Kin | None:
+    """What ended lives of its kind say about the end of this life; None with fewer than two ended lives or too few
+    tests."""
     exact = np.array([not life.censored for life in lives], dtype=bool)
     # two lives say more than none (`make real`)
     if np.count_nonzero(exact) < 2 or len({test.progress for test in tests}) < criteria.FEWEST_TESTS:
@@ -327,6 +331,8 @@ class _Decline:
 
     @classmethod
     def of(cls, tests: Sequence[Measurement], offset: FloatArray | None, fraction: float) -> "_Decline | None":
+        """The decline of a life's tests, in coordinates in which δ and scatter are independent; None if the first value
+        is not positive."""
         rows = [(t.progress, t.value, t.variance, t.epoch, t.new_levels) for t in tests]
         progress, value, variance, epoch, new_levels = np.array(rows).T
         value = value if offset is None else value + offset

@@ -222,10 +222,12 @@ def weighted_quantiles(sample: FloatArray, weight: FloatArray, quantiles: Sequen
 
 
 def _probability(event: np.ndarray[tuple[int, ...], np.dtype[np.bool_]], weight: FloatArray) -> float:
+    """The share of the weight at which an event is true."""
     return float(min(1.0, weight[event].sum() / weight.sum()))
 
 
 def _status(end_of_life: dict[float, float | None], passed: float) -> PassageStatus:
+    """The status of a prediction, by the probability that the end has passed and by the quantiles that are open."""
     if passed >= 0.5:
         return PassageStatus.REACHED
     return PassageStatus.MAY_NEVER_REACH if None in end_of_life.values() else PassageStatus.PREDICTED

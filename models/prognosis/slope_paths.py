@@ -91,8 +91,8 @@ def _merged(
 
 
 def _solved(b: FloatArray, values: FloatArray, weight: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Joint posterior of (ξ0 [q], Δ [q]) given b [t, q, n]: mean [n, 2q], Cholesky root of the precision [n, 2q, 2q],
-    log evidence [n]."""
+    """Joint posterior of (ξ0 [q], Δ [q]) from values [t, q] with precision matrices `weight` [t, q, q], given b
+    [t, q, n]: mean [n, 2q], Cholesky root of the precision [n, 2q, 2q], log evidence [n]."""
     q, n = values.shape[1], b.shape[2]
     around = values[0]
     precision = np.empty((n, 2 * q, 2 * q))

@@ -49,9 +49,9 @@ class LateStart:
     initial: float
 
     def weighed(self, own: FloatArray, weight: FloatArray) -> tuple[float, FloatArray]:
-        """Probability of the alternative, and the weights of a filter's `own` ends [n] under the other one, from
-        weights [n] that sum to one: ends before the first test have weight 0, and probability and weights sum to one
-        together."""
+        """Posterior probability that the clutch was new at its first test, and the weights left to the ends [n] that a
+        filter drew as if it was not, from their own weights [n]. Together they sum to one; ends before the first test
+        get none."""
         alive = np.where(own > self.begun, weight, 0.0)
         share = float(alive.sum())
         if share == 0.0:

@@ -245,6 +245,7 @@ _SENTENCES = {
 
 
 def _ramps(channel: _Channel, where: slice) -> bool:
+    """Whether a channel moves evenly over a part of the record, by more than its noise."""
     part = channel.values[where]
     pieces = min(6, part.size // 2)
     means = part[: part.size // pieces * pieces].reshape(pieces, -1).mean(axis=1)

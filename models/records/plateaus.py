@@ -115,6 +115,7 @@ def _stretches(blocks: Blocks, dwells: list[slice]) -> list[Stretch]:
 
 
 def _plateaus(blocks: Blocks, used: list[slice], torque_sd: FloatArray) -> Plateaus:
+    """The means of all channels over the used part of each dwell."""
     torque = _mean(blocks.torque, used)
     return Plateaus(
         pressure=_mean(blocks.pressure, used),
@@ -127,6 +128,7 @@ def _plateaus(blocks: Blocks, used: list[slice], torque_sd: FloatArray) -> Plate
 
 
 def _notes(cut: PlateauCut, drop: FloatArray) -> list[Note]:
+    """Sentences on what was discarded, did not settle or drifts."""
     notes = [
         (
             "transient_discarded",
@@ -149,6 +151,7 @@ def _notes(cut: PlateauCut, drop: FloatArray) -> list[Note]:
 
 
 def _used(blocks: Blocks, dwell: slice, drop: float) -> slice:
+    """The rows of a dwell after its settling time, three at least."""
     first = int(np.searchsorted(blocks.time[dwell], blocks.time[dwell.start] + drop))
     return slice(min(dwell.start + first, dwell.stop - 3), dwell.stop)
 

@@ -75,6 +75,7 @@ class _Basis:
 
 
 def _basis(time: FloatArray, taus: FloatArray) -> _Basis:
+    """Decaying exponentials of these time constants, free of mean and of trend where they are short."""
     decay = np.exp(-time / taus[:, np.newaxis])
     decay -= decay.mean(axis=1, keepdims=True)
     trend = time - time.mean()
@@ -86,6 +87,7 @@ def _basis(time: FloatArray, taus: FloatArray) -> _Basis:
 
 
 def _scan(stretch: Stretch, basis: _Basis) -> _Scan:
+    """For each time constant how much of a stretch's torque it explains, and the residual and variance of the best one."""
     off = stretch.torque - stretch.torque.mean()
     along = basis.decay @ off
     gain = along**2 / basis.square

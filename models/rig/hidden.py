@@ -47,7 +47,7 @@ class HiddenTest:
     wear: float
 
 
-Change: TypeAlias = Callable[[float, HiddenTest], FloatArray]
+TorqueChange: TypeAlias = Callable[[float, HiddenTest], FloatArray]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,7 +59,7 @@ class HiddenEffect:
     meaning: str
     unit: str
     size: float
-    change: Change
+    change: TorqueChange
     loops: bool = False
 
 
@@ -112,10 +112,10 @@ def clutch_for(clutch: SimulatedClutch, sizes: Mapping[str, float]) -> Simulated
 EFFECTS: dict[str, HiddenEffect] = {}
 
 
-def _hides(meaning: str, unit: str = "", *, size: float, loops: bool = False) -> Callable[[Change], Change]:
+def _hides(meaning: str, unit: str = "", *, size: float, loops: bool = False) -> Callable[[TorqueChange], TorqueChange]:
     """A decorator that registers a change of torque as an effect, whose slug is the function's name."""
 
-    def listed(change: Change) -> Change:
+    def listed(change: TorqueChange) -> TorqueChange:
         slug = change.__name__.removeprefix("_")
         EFFECTS[slug] = HiddenEffect(slug=slug, meaning=meaning, unit=unit, size=size, change=change, loops=loops)
         return change
@@ -126,6 +126,7 @@ def _hides(meaning: str, unit: str = "", *, size: float, loops: bool = False) ->
 def _changed(
     effect: HiddenEffect, size: float, held: Plateaus | Record, clutch: SimulatedClutch, run: SimulatedRun
 ) -> Plateaus | Record:
+    """A test's channels with the torque of a hidden effect added."""
     if effect.loops and isinstance(held, Plateaus):
         return held
     middles = PLATEAU_DURATION * (np.arange(held.torque.size, dtype=np.float64) + 0.5)

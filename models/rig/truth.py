@@ -36,6 +36,7 @@ OPEN = 1.0
 
 
 def _share(change: float, scale: float, exponent: float) -> DegradationLaw:
+    """A course of eq. 6 that begins at 1."""
     return DegradationLaw(initial=1.0, change=change, scale=scale, exponent=exponent)
 
 

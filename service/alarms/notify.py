@@ -51,6 +51,7 @@ def require_address(url: str, *, private: bool) -> None:
 
 
 def _require_apprise(url: str, scheme: str) -> None:
+    """Raise InvalidError unless Apprise is installed and understands the address."""
     if not scheme or scheme in _LOCAL or receivers.has_controls(url):
         raise receivers.wrong_address(
             "url must be a web address such as https://example.org/hook, or an address of Apprise"
@@ -67,6 +68,7 @@ def _require_apprise(url: str, scheme: str) -> None:
 
 
 def send(url: str, body: bytes, *, secret: str, delivery_id: str, private: bool) -> receivers.Attempt:
+    """Send a notification to a receiver, by HTTP with a signature or through Apprise; the outcome of the attempt."""
     if receivers.scheme_of(url) in _WEB:
         return receivers.post(url, body, secret=secret, delivery_id=delivery_id, private=private)
     content = json.loads(body)
@@ -103,6 +105,8 @@ def confine(private: bool) -> None:
     places = tuple({sys.prefix, sys.base_prefix, *(path for path in sys.path if path)}) + _SYSTEM_FILES
 
     def watch(event: str, arguments: tuple[Any, ...]) -> None:
+        """Python's audit hook: refuses connections to forbidden addresses, files outside the allowed places, and new
+        processes."""
         if event in ("socket.connect", "socket.sendto"):
             _require_connectable(arguments[-1], private=private)
         elif event == "open":
@@ -118,6 +122,7 @@ def confine(private: bool) -> None:
 
 
 def _require_connectable(address: Any, *, private: bool) -> None:
+    """Raise PermissionError or NotAllowedError if the sending process must not connect to an address."""
     if not isinstance(address, tuple):
         raise PermissionError("the sender tried to use a local socket")
     try:

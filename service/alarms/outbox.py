@@ -83,6 +83,7 @@ class Outbox:
             self._change.notify_all()
 
     def _work(self) -> None:
+        """The loop of the outbox's thread: sends what is due, and looks for silent rigs from time to time."""
         while not self._closing:
             try:
                 self._deliver()
@@ -101,6 +102,7 @@ class Outbox:
                 self._woken = False
 
     def _deliver(self) -> None:
+        """Claim the deliveries that are due, and send each in a thread of its own."""
         with self._change:
             busy = frozenset(self._busy)
         with self._database.reading() as connection:
@@ -151,6 +153,7 @@ class Outbox:
             self._planned[row.delivery_key] = (row.attempts, row.last_attempt_at), time.monotonic() + pause
 
     def _attempt(self, row: DeliveryRow, receiver: WebhookRow, *, private: bool) -> None:
+        """Send one delivery, store the outcome, and plan the next attempt."""
         tried = row
         try:
             secret, name = receiver.secret, row.delivery_id

@@ -140,6 +140,7 @@ def _is_of(event: EventRow, rule: AlarmIn, finding: Finding) -> bool:
 
 
 def _raise(row: AlarmRow, rule: AlarmIn, facts: ClutchFacts, finding: Finding) -> None:
+    """Store a new alarm of a rule, and put a message for each receiver into the outbox."""
     content: Json = {
         "name": rule.name,
         "value": finding.value,

@@ -192,6 +192,7 @@ def _status(parts: SplitResult, address: tuple[Any, ...], body: bytes, headers: 
 
 
 def _cut(raw: socket.socket) -> None:
+    """End a connection that takes too long, from another thread."""
     with suppress(OSError):
         raw.shutdown(socket.SHUT_RDWR)
 

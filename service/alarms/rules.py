@@ -204,6 +204,7 @@ def _off_course(_rule: AlarmIn, facts: ClutchFacts) -> Finding | None:
 
 
 def _verdict(rule: AlarmIn, facts: ClutchFacts) -> Finding | None:
+    """The finding of a rule on verdicts: the newest diagnosis is of this life, has one of them, and was not adopted."""
     newest = diagnoses.newest(facts.connection, [facts.clutch_id]).get(facts.clutch_id)
     verdicts = tuple(condition.DISAGREES) if rule.any_of is None else rule.any_of
     if newest is None or newest.adopted or newest.verdict not in verdicts:
@@ -216,6 +217,7 @@ def _verdict(rule: AlarmIn, facts: ClutchFacts) -> Finding | None:
 
 
 def _state(rule: AlarmIn, facts: ClutchFacts) -> Finding | None:
+    """The finding of a rule on states: the clutch is in one of them."""
     state = condition.state_of(facts.summary, disputed=facts.clutch.is_disputed, silent=facts.clutch.silent)
     name = state["name"]
     if name not in (rule.any_of or [other for other in condition.STATE_WORDS if other != condition.NORMAL]):

@@ -116,6 +116,7 @@ class _Shown:
 
 
 def _shown(connection: Connection, rows: Sequence[ClutchRow]) -> list[_Shown]:
+    """The clutches of these rows, each with its newest diagnosis and its unacknowledged alarms."""
     names = [row.clutch_id for row in rows]
     newest, raised = diagnoses.newest(connection, names), alarms.raised(connection, names)
     return [
@@ -129,6 +130,7 @@ def _shown(connection: Connection, rows: Sequence[ClutchRow]) -> list[_Shown]:
 
 
 def _item(clutch: _Shown) -> ClutchOut:
+    """A clutch as the list of clutches shows it."""
     row, diagnosis = clutch.row, clutch.diagnosis
     first_line = repository.first_line(row, diagnosis, raised=len(clutch.alarms))
     return of_row(

@@ -163,6 +163,7 @@ def rows(answer: Degradation) -> Iterator[Cells]:
 
 
 def _severity_item(estimate: SeverityPosterior | None) -> SeverityWeighed | None:
+    """The estimated severity exponent as an answer shows it; None if it was not estimated."""
     if estimate is None:
         return None
     return SeverityWeighed(

@@ -78,6 +78,8 @@ def engaged(database: Database, clutch_id: str, at_cycles: float | None, run_id:
 
 
 def _compared_row(measured: Sequence[MeasuredEngagement], life: Life, run_id: str | None) -> MeasuredEngagement | None:
+    """The measured engagement to compare with the prediction: of the named run, or the newest one (None: the life has
+    none)."""
     run_ids = {event.run_id for event in life.events}
     rows = [row for row in measured if row.run_id in run_ids]
     if run_id is None:

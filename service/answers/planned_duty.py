@@ -42,7 +42,7 @@ _SECONDS_PER_HOUR = 3600.0
 _PLANS = 500
 _NORMALS = ndtri((np.arange(_PLANS) + 0.5) / _PLANS)
 
-Blocks = Sequence[PlannedBlock]
+PlannedBlocks = Sequence[PlannedBlock]
 
 
 def planned_life(database: Database, clutch_id: str, method: str, planned: ProgrammeIn) -> PlannedLife:
@@ -176,7 +176,7 @@ class _Counted:
     geometry: Geometry
     assumed: bool = False
 
-    def programme(self, blocks: Blocks, cof: float, rng: np.random.Generator) -> DutyProgramme:
+    def programme(self, blocks: PlannedBlocks, cof: float, rng: np.random.Generator) -> DutyProgramme:
         """The programme, with random draws for unstated values; a block without a stated severity counts like recent
         duty."""
         rates = np.full((_PLANS, len(blocks)), self.scale.rate)
@@ -186,7 +186,7 @@ class _Counted:
                 rates[:, place] = counted(work, self.scale.reference, self.severity.exponent)
         return DutyProgramme(cycles=np.array([block.cycles for block in blocks]), rates=rates)
 
-    def notices(self, blocks: Blocks) -> list[Notice]:
+    def notices(self, blocks: PlannedBlocks) -> list[Notice]:
         """A warning if planned cycles count by an assumed energy, or if their severity cannot be counted."""
         basis = self.severity.basis.value.replace("_", " ")
         if self.assumed and self.scale.reference is not None:

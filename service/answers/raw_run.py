@@ -75,7 +75,7 @@ def write_parquet(path: Path, head: RunDescription, names: tuple[str, ...], valu
     parquet.write_table(table, path, row_group_size=_ROW_GROUP, use_dictionary=False, compression="zstd")
 
 
-Kind = Literal["json", "parquet"]
+RawFormat = Literal["json", "parquet"]
 
 #: The channel that samples have and plateaus do not.
 _TIME = "time_s"
@@ -86,7 +86,7 @@ _LEVEL = 6
 
 
 def entity_tag(
-    database: Database, clutch_id: str, run_id: str, *, points: int | None, kind: Kind, compressed: bool = False
+    database: Database, clutch_id: str, run_id: str, *, points: int | None, kind: RawFormat, compressed: bool = False
 ) -> str:
     """The tag that `write_run` will return if the run's receipt does not change meanwhile; no channel is read.
 
@@ -96,7 +96,7 @@ def entity_tag(
     return _tag(head, points, kind, compressed)
 
 
-def _tag(head: RunDescription, points: int | None, kind: Kind, compressed: bool) -> str:
+def _tag(head: RunDescription, points: int | None, kind: RawFormat, compressed: bool) -> str:
     """The entity tag from the hashes of the content, in the receipt and (if its file was read again) in the audit
     trail; no channel is read."""
     writer = parquet_writer() if kind == "parquet" else "json"
@@ -110,7 +110,7 @@ def write_run(
     run_id: str,
     *,
     points: int | None,
-    kind: Kind,
+    kind: RawFormat,
     path: Path,
     compressed: bool = False,
 ) -> str:

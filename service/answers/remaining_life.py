@@ -96,6 +96,7 @@ def _by_method(connection: Connection, clutch_id: str, at_cycles: float | None) 
 def _predicted(
     state: ClutchHistory, method: str, pressure_bar: float | None, at_cycles: float | None
 ) -> LifePrediction:
+    """The prediction of remaining life by mean COF, computed from the clutch's history."""
     carried = (state.filters or {}).get(CARRIED)
     return predict_at(
         state.lives,
@@ -210,6 +211,7 @@ def _by_criteria(
     criterion: str | None,
     pressure_bar: float | None,
 ) -> tuple[LifePrediction, list[CriterionOutcome]]:
+    """The prediction by the requested criteria together, and what each of them says alone."""
     prediction = predict_at(
         [] if chosen.life is None else [chosen.life], chosen.assumptions, state.fraction, method=method
     )
@@ -227,6 +229,7 @@ def _by_criteria(
 def _requested_criteria(
     record: EndOfLifeIn, measured: MeasuredLife, quantity: str | None, criterion: str | None, pressure_bar: float | None
 ) -> Sequence[CriterionIn]:
+    """The criteria that a request asks for: those of the clutch's record, or one on the requested quantity."""
     of_clutch = record.criteria or (CriterionIn(quantity="mean_cof", fraction=record.cof_fraction),)
     if quantity is None and criterion is None and pressure_bar is None:
         return of_clutch

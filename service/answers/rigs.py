@@ -157,6 +157,7 @@ def _with_stated(used: RigProfile | None, shown: ShownTable, reading: Reading) -
 
 
 def _clutch(database: Database, clutch_id: str | None) -> tuple[Geometry, float]:
+    """Geometry and torque filter of a clutch; those of the reference if none is given or it is not registered."""
     with database.reading() as connection:
         row = None if clutch_id is None else clutches.get(connection, clutch_id)
     record = ClutchIn(clutch_id="any") if row is None else repository.record(row)
@@ -214,6 +215,7 @@ def _stated_without_column(reading: Reading) -> list[RigColumn]:
 
 
 def _column(column: ShownColumn, profile: RigProfile | None) -> PreviewColumn:
+    """A column of a file as its preview shows it: the title, the unit, and the channel by the rig profile."""
     title = _title(column)
     profile_column = next((item for item in profile.columns if item.title == title), None) if profile else None
     channel = None if profile_column is None else profile_column.channel
@@ -305,6 +307,7 @@ def _evaluated(
 
 
 def _drawn(columns: Mapping[str, FloatArray], samples: int) -> dict[str, list[float]]:
+    """The channels as lists for a plot, thinned to the extreme rows."""
     if samples > _POINTS:
         rows = extreme_rows(columns.values(), len(columns), samples=samples, points=_POINTS)
         columns = {name: column[rows] for name, column in columns.items()}
@@ -328,4 +331,5 @@ def _pieces(run: IncomingRun, torque_filter: float) -> list[PreviewPiece]:
 
 
 def _piece(start: float, stop: float, pressure: float, speed: float | None) -> PreviewPiece:
+    """A part of a record at one pressure, as the preview shows it."""
     return PreviewPiece(start_s=start, stop_s=stop, pressure_bar=bar(pressure), speed_rpm=speed)

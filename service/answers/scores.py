@@ -90,6 +90,7 @@ def _predictions(life: Life, assumptions: Assumptions, fraction: float, method: 
 
 
 def _scored(life: Life, assumptions: Assumptions, end: float, made: Mapping[float, LifePrediction]) -> ScoredLife:
+    """The score of the predictions made during an ended life, compared with its known end."""
     at = sorted({event.cycles for event in life.events if event.cofs and event.cycles < end})
     tests = [_test(made[cycles], cycles, life.origin, end) for cycles in at if made[cycles].status != INSUFFICIENT]
     horizon = scoring.prognostic_horizon(

@@ -116,6 +116,7 @@ class _RunColumns:
 
 
 def _measured(run: _RunColumns, fit: Fit) -> Iterator[SeriesItem]:
+    """Mean COF and the Stribeck parameters of a fitted curve, a row each."""
     yield run.row(MEAN_COF, "1", fit.mean_cof, fit.mean_cof_sd, pressure_bar=fit.pressure_bar)
     for public, unit in PARAMETER_UNITS.values():
         value, sd = getattr(fit.parameters, public), getattr(fit.standard_errors, public)
@@ -140,6 +141,7 @@ def _slopes(
 
 
 def _rows_of_loop(run: _RunColumns, loop: Loop) -> Iterator[SeriesItem]:
+    """The quantities of a friction loop, a row each."""
     frequency = None if loop.frequency_hz is None else rounded_frequency(loop.frequency_hz)
     for quantity, names in LOOP_COLUMNS.items():
         value, sd = (getattr(loop, name) for name in names)
@@ -149,6 +151,7 @@ def _rows_of_loop(run: _RunColumns, loop: Loop) -> Iterator[SeriesItem]:
 
 
 def _indicators(row: MeasuredEngagement) -> Iterator[SeriesItem]:
+    """The indicators of an engagement, a row each."""
     run = _RunColumns(row.run_id, row.cycles, row.time)
     for quantity, indicator in ALL_INDICATORS.items():
         estimate = getattr(row.indicators, quantity)

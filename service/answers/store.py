@@ -199,6 +199,7 @@ class AnswerStore:
         return mine.result()
 
     def _current(self, key: Hashable, version: Hashable) -> CachedAnswer | None:
+        """The cached answer at exactly this version; the caller holds the lock."""
         cached_version, answer, _ = self._answers.get(key, (None, None, 0))
         if answer is None or cached_version != version:
             return None
@@ -213,6 +214,7 @@ class AnswerStore:
         pending: "Future[CachedAnswer]",
         begun: int,
     ) -> None:
+        """Compute an answer, cache it unless a later version came first, and give it to all who wait for `pending`."""
         try:
             answer = CachedAnswer.of(make())
         except BaseException as error:  # noqa: BLE001  (raised again for each who asked)
@@ -227,6 +229,7 @@ class AnswerStore:
         pending.set_result(answer)
 
     def _hold(self, key: Hashable, version: Hashable, answer: CachedAnswer, begun: int) -> None:
+        """Cache an answer, and drop the least recently requested ones that no longer fit; the caller holds the lock."""
         self._drop(key)
         if answer.size <= self._most:
             self._held += answer.size
@@ -299,6 +302,7 @@ class AnswerStore:
     async def _computed(
         self, key: Hashable, computing: "Future[Made]", tasks: dict[Hashable, _Making]
     ) -> tuple[int, CachedAnswer]:
+        """The answer that a worker computes, put into the cache; the cached one if that is of a later revision."""
         try:
             revision, body = await asyncio.wrap_future(computing)
         finally:

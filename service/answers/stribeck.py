@@ -72,6 +72,7 @@ def rows(page: StribeckPage) -> Iterator[Cells]:
 
 
 def _item(row: RunRow, levels: Sequence[LevelFit]) -> StribeckItem:
+    """The fitted curves of one test, with the pressure laws through them."""
     fits = [level.fit for level in levels]
     laws = fit_pressure_laws(fits)
     return StribeckItem(

@@ -78,6 +78,7 @@ class _Sum:
 
 
 def _finished(part: Callable[[Database, str], Checked], database: Database, clutch_id: str) -> Checked:
+    """The result of one part of the check; an error of the part is a finding."""
     try:
         return part(database, clutch_id)
     except Exception as error:  # noqa: BLE001  (a damaged value may lead to any)
@@ -103,6 +104,7 @@ def check_other_rows(database: Database) -> Checked:
 
 
 def _unreadable(connection: Connection, chosen: Mapping[sa.Table, sa.ColumnElement[bool]]) -> list[str]:
+    """A sentence for each row of these tables that fails its checksum or cannot be read."""
     found = []
     for table, rows in chosen.items():
         try:
@@ -121,6 +123,7 @@ def _tables(*, of_clutches: bool) -> list[sa.Table]:
 
 
 def _of_clutch(table: sa.Table, clutch_id: str) -> sa.ColumnElement[bool]:
+    """The condition that rows of a table belong to a clutch."""
     if "clutch_id" in table.c:
         return table.c.clutch_id == clutch_id
     return table.c.run_key.in_(sa.select(run.c.run_key).where(run.c.clutch_id == clutch_id))
@@ -136,6 +139,7 @@ def check_runs(database: Database, clutch_id: str) -> Checked:
 
 
 def _finding(database: Database, row: RunRow) -> str | None:
+    """The sentence on a run that differs from what was sent or cannot be checked; None if it is intact."""
     try:
         return _of_run(database, row)
     except Exception as error:  # noqa: BLE001  (as in `_finished`: the next run is to be checked too)
@@ -143,6 +147,7 @@ def _finding(database: Database, row: RunRow) -> str | None:
 
 
 def _of_run(database: Database, row: RunRow) -> str | None:
+    """The sentence on a run that differs from what was sent; None if it is intact."""
     try:
         with database.reading() as connection:
             columns = raw_columns.stored_of_run(connection, row.run_key)
@@ -164,6 +169,7 @@ def _of_run(database: Database, row: RunRow) -> str | None:
 
 
 def _file_finding(file: Stored | None, run_id: str, wanted: str) -> str | None:
+    """The sentence on a run's file that is missing or differs from what was sent; None if it is intact."""
     try:
         sha256 = "none" if file is None else file.copy_to(None)
     except DamagedData as error:
@@ -199,6 +205,7 @@ def check_results(database: Database, clutch_id: str) -> Checked:
 
 
 def _compared(clutch_id: str, stored: _Results, again: Mapping[str, Any]) -> Checked:
+    """The differences between stored results and those computed again; results of earlier releases are only counted."""
     earlier = Counter(version for version, _ in stored.values() if version != CODE_VERSION)
     lines = [f"{name} is stored, but the runs do not give it" for name in stored.keys() - again.keys()]
     lines += [f"{name} is missing, although the runs give it" for name in again.keys() - stored.keys()]
@@ -214,6 +221,7 @@ def _compared(clutch_id: str, stored: _Results, again: Mapping[str, Any]) -> Che
 
 
 def _stored(connection: Connection, clutch_id: str) -> _Results:
+    """The stored results of a clutch by name, each with the release that computed it."""
     rows = runs.page(connection, clutch_id)
     fits = results.fits_of(connection, clutch_id)
     named = {f"the receipt of run {row.run_id}": (row.code_version, row.receipt) for row in rows}
@@ -227,6 +235,7 @@ def _stored(connection: Connection, clutch_id: str) -> _Results:
 
 
 def _recomputed(computed: Results) -> Mapping[str, object]:
+    """The results computed again, by the same names as the stored ones."""
     named: dict[str, object] = {
         f"the receipt of run {run_id}": repository.json_of(receipt) for run_id, receipt in computed.receipts.items()
     }
@@ -240,10 +249,12 @@ def _recomputed(computed: Results) -> Mapping[str, object]:
 
 
 def _fit(run_id: str, pressure: float) -> str:
+    """How findings name a fit."""
     return f"the fit of run {run_id} at {bar(pressure):g} bar"
 
 
 def _prediction(method: str, cycles: float) -> str:
+    """How findings name a prediction."""
     return f"the prediction by {method} at {cycles:g} cycles"
 
 
@@ -286,6 +297,7 @@ def check_inspections(database: Database, clutch_id: str) -> Checked:
 
 
 def _inspection_finding(row: InspectionRow) -> str | None:
+    """The sentence on an inspection that differs from what was sent; None if it is intact."""
     sha256 = inspection_hash(row.content)
     if sha256 == row.content_sha256 and row.cycles == row.content["cycles"]:
         return None
@@ -296,6 +308,7 @@ def _inspection_finding(row: InspectionRow) -> str | None:
 
 
 def _photograph_finding(database: Database, row: InspectionRow, photograph: PhotographRow) -> str | None:
+    """The sentence on a photograph that differs from what was sent; None if it is intact."""
     with database.reading() as connection:
         data = inspections.data(connection, row.inspection_key, photograph.sha256)
     sha256 = hashlib.sha256(data or b"").hexdigest()

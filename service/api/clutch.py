@@ -48,6 +48,7 @@ class GeometryIn(base.Schema):
         return self
 
     def to_model(self) -> Geometry:
+        """The geometry in SI units."""
         return Geometry(
             inner_diameter=self.inner_diameter_mm / 1000,
             outer_diameter=self.outer_diameter_mm / 1000,

@@ -9,7 +9,7 @@ from service.api.life import ModelName
 
 Number = base.Real | None
 Numbers = list[base.Real | None]
-Table = list[list[base.Real | None]]
+NumberTable = list[list[base.Real | None]]
 JobState = Literal["waiting", "running", "finished", "failed", "cancelled"]
 DiagnosisName = Annotated[str, Field(description="The diagnosis' name")]
 
@@ -266,8 +266,8 @@ class Axes(base.Answer):
 class ResidualMap(base.Answer):
     """Mean residuals, in standard deviations."""
 
-    speed_pressure: Table = Field(description="One row per pressure, one column per speed")
-    pressure_cycles: Table = Field(description="One row per count of cycles, one column per pressure")
+    speed_pressure: NumberTable = Field(description="One row per pressure, one column per speed")
+    pressure_cycles: NumberTable = Field(description="One row per count of cycles, one column per pressure")
 
 
 class MapsOut(base.Answer):

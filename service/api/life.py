@@ -75,6 +75,8 @@ class CriterionIn(Schema):
 
     @model_validator(mode="after")
     def _is_one_limit_at_one_place(self) -> Self:
+        """Refuses a criterion without exactly one limit, or without the pressure, speed or frequency that its quantity
+        needs."""
         limits = [name for name in ("fraction", "below", "above") if getattr(self, name) is not None]
         if len(limits) != 1:
             raise ValueError(

@@ -92,6 +92,7 @@ class RigProfile(Schema):
 
     @model_validator(mode="after")
     def _titles_and_channels_are_unique(self) -> Self:
+        """Refuses a profile in which a title or channel stands twice, or no column holds a channel."""
         for name in ("title", "channel"):
             values = [value for column in self.columns if (value := getattr(column, name)) is not None]
             twice = next((value for value, count in Counter(values).items() if count > 1), None)

@@ -131,6 +131,7 @@ def _in_force(connection: Connection, clutch_id: str, diagnosis_id: str | None) 
 
 
 def _adoptable(row: DiagnosisRow) -> Adoption:
+    """The model extension of a diagnosis. Raises NothingToAdoptError."""
     if row.extension is None:
         why = "has no report yet: wait for it" if row.report is None else "has no extended model that could be adopted"
         raise NothingToAdoptError(f"diagnosis {row.diagnosis_id!r} {why}")
@@ -138,6 +139,7 @@ def _adoptable(row: DiagnosisRow) -> Adoption:
 
 
 def _require_present(adoption: Adoption, life: str) -> None:
+    """Raise NothingToAdoptError if a diagnosis is of an earlier life."""
     if adoption.life != life:
         raise NothingToAdoptError(
             f"diagnosis {adoption.diagnosis_id!r} is of the life before the last rebuild: run a new diagnosis"

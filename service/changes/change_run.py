@@ -189,6 +189,8 @@ def read_again(
 def _change(
     database: Database, request: _Request, again: IncomingRun | None = None, columns: Encoded | None = None
 ) -> list[Receipt]:
+    """Apply a request to its runs and store what follows from them; the receipts. Computed again if the clutch changed
+    meanwhile. `again`, `columns`: a run that was read again from its file."""
     attempts = repository.attempts(request.clutch_id)
     while True:
         next(attempts)
@@ -232,6 +234,7 @@ def _with(loaded: _Loaded, run: IncomingRun) -> _Loaded:
 
 
 def _load(database: Database, request: _Request) -> _Loaded:
+    """The runs of a request with all that is needed to compute the change, read in one transaction."""
     clutch_id = request.clutch_id
     with database.reading() as connection:
         rows = {run_id: repository.run(connection, clutch_id, run_id) for run_id in request.run_ids}
@@ -310,6 +313,7 @@ def _alone(database: Database, loaded: _Loaded, row: RunRow, cycles: float) -> t
 
 
 def _together(others: ClutchHistory, incoming: Event | None, changed: Sequence[Event] = ()) -> Judged:
+    """The plausibility judgement of a clutch's runs, with an incoming and with changed ones."""
     corrected = others.extension is not None
     return doubts_together(others.events, others.held, incoming, others.geometry, corrected=corrected, changed=changed)
 
@@ -380,13 +384,14 @@ def _store(
     for was, row in zip(loaded.rows, changed, strict=True):
         before, after = repository.summary(was), repository.summary(row)
         if loaded.again is not None:
-            before |= _read_as(was.details["file"])
-            after |= _read_as(loaded.again.run.file or {})
+            before |= _how_read(was.details["file"])
+            after |= _how_read(loaded.again.run.file or {})
         if before["doubts"] == after["doubts"]:
             del before["doubts"], after["doubts"]
         entry = {"run_id": row.run_id, "at": request.at, "by": request.by, "reason": request.reason}
         changes.insert(connection, clutch_id, request.action, before, after, revision=revision, **entry)
 
 
-def _read_as(file: Mapping[str, object]) -> dict[str, object]:
+def _how_read(file: Mapping[str, object]) -> dict[str, object]:
+    """The rig profile and the settings with which a file was read."""
     return {"rig": file["rig"], "reading": file["reading"]}

@@ -58,6 +58,7 @@ def edit(
 
 
 def _computed(database: Database, clutch_id: str, fields: Mapping[str, Any], archived: bool | None) -> _Edited:
+    """The edited record, with the clutch's results under it if it differs from the stored one."""
     with database.reading() as connection:
         row = repository.clutch(connection, clutch_id)
     before = repository.record(row)

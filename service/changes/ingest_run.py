@@ -117,6 +117,7 @@ def ingest(
 def _ingested(
     database: Database, clutch_id: str, run: IncomingRun, *, received_at: str, by: str, file: PackedFile | None
 ) -> tuple[Receipt, bool]:
+    """Store a run: `ingest` without its repair of damaged results."""
     with database.reading() as connection:
         clutch = repository.clutch(connection, clutch_id)
         stored = _stored(connection, clutch_id, run)
@@ -163,6 +164,7 @@ def _stored(connection: Connection, clutch_id: str, run: IncomingRun) -> RunRow 
 
 
 def _repeat(stored: RunRow, run: IncomingRun) -> Receipt:
+    """The receipt of a run that is sent again, marked a duplicate. Raises ConflictError if its content differs."""
     if run.content_sha256 not in (stored.content_sha256, stored.details.get("file", {}).get("content_sha256")):
         raise ConflictError(
             f"run_id {run.run_id!r} is already stored with other content: the stored sha256 is {stored.content_sha256}, "
@@ -296,6 +298,7 @@ def _one_step(
 
 
 def _evidence(database: Database, state: ClutchHistory, arrival: Arrival, answer: Evaluation) -> ClutchMeasurements:
+    """The stored measurements of a clutch with those of the run that comes in."""
     name = arrival.run.run_id
     with database.reading() as connection:
         stored = repository.evidence(connection, state.clutch_id)
@@ -310,6 +313,7 @@ def _evidence(database: Database, state: ClutchHistory, arrival: Arrival, answer
 
 
 def _own_levels(arrival: Arrival) -> dict[str, Sequence[LevelFit]]:
+    """The fits of the run that comes in, by its name; empty if it has none."""
     return {arrival.run.run_id: arrival.analysis.fits} if arrival.analysis.fits else {}
 
 
@@ -360,6 +364,7 @@ def _store(
 
 
 def _event_of(arrival: Arrival) -> timeline.Event:
+    """The run that comes in as an event of the clutch's history."""
     run = arrival.run
     moment, dated = timeline.moment_of(run.started_at, arrival.received_at)
     duty = run.details.get("duty") or {}

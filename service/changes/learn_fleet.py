@@ -207,6 +207,7 @@ def as_job(
 
 
 def _ask_for_the_rest(database: Database, task: ChangeTask) -> None:
+    """Ask for another job, which tracks the remaining clutches again under the new priors."""
     kind = None if task.of is None else _kind(task.of)
     with database.writing(of=jobs.FLEET_REFRESH) as connection:
         repository.ask_fleet_refresh(connection, kind, by=task.by, at=task.at, learned=True)
@@ -260,8 +261,7 @@ def _lesson(life: Life, assumptions: Assumptions, fraction: float) -> Lesson | N
 
 
 def _stored_again(database: Database, fleet: Fleet, now: str, executor: Executor) -> Ending:
-    """Store a fleet's prior, and the priors learned without each of its clutches, as the version after the one its
-    lessons were read at.
+    """Learn and store the next version of a fleet's prior, with the same learned without each of its clutches.
 
     Returns NOTHING if the stored prior is equal, LEFT if another refresh has stored a version meanwhile.
     """
@@ -315,6 +315,7 @@ def _brought_up(database: Database, names: Sequence[str], executor: Executor) ->
     """Track the clutches again whose stored predictions are based on another prior."""
 
     def load(clutch_id: str) -> _Tracked | None:
+        """The state of a clutch to be tracked again; None if its prediction rests on the newest prior already."""
         with database.reading() as connection:
             state = repository.state(connection, clutch_id, newest_prior=True)
             last = results.prediction_at(connection, clutch_id, CARRIED, ALL_PRESSURES)
@@ -334,6 +335,7 @@ def _brought_up(database: Database, names: Sequence[str], executor: Executor) ->
 
 
 def _retracked(tracked: _Tracked) -> Results:
+    """The results of a clutch tracked under its fleet's newest prior."""
     state, receipts, evidence = tracked
     tracking = track(state)
     return Results(

@@ -116,6 +116,7 @@ def collect(database: Database, *, grace: float, now: float | None = None) -> li
 
 
 def _collected(database: Database, store: RawStore, *, before: float, now: float) -> Collected:
+    """Remove the blobs of a store that no row names and that are older than `before`; how many there were of each kind."""
     opened = open_store(store.address)
     _require_mark(opened, store.mark)
     with database.reading() as connection:
@@ -179,6 +180,7 @@ def _require_mark(store: BlobStore, mark: str) -> None:
 
 
 def _named(database: Database, store: RawStore) -> Iterator[str]:
+    """The names of all blobs of a store that rows of the database refer to."""
     after = ""
     while True:
         with database.reading() as connection:

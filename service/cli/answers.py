@@ -136,6 +136,7 @@ def _show_life(answer: Mapping[str, Any]) -> None:
 
 
 def _lines(answer: Mapping[str, Any]) -> Iterator[str]:
+    """The lines that `clutchlife rul` prints below the first: mean COF, days, method, pace and severity."""
     current, criterion = answer["current"], answer["criterion"]
     if current.get("mean_cof") is not None:
         cof, fraction = with_deviation(current["mean_cof"], current["mean_cof_sd"]), current["fraction_of_initial"]
@@ -218,6 +219,7 @@ def _programme(plan: Path | None, blocks: list[str], pace: float | None) -> Json
 
 
 def _block(text: str) -> dict[str, float]:
+    """A planned block from the text of `--block`; the command ends if it cannot be read."""
     names = ("cycles", "energy_per_cycle_kj", "sd")
     try:
         values = [float(part) for part in text.split(":")]
@@ -295,6 +297,7 @@ def loops(
 
 
 def _loop(item: Mapping[str, Any]) -> list[str]:
+    """A friction loop as a row of the printed table."""
     return [
         item["run_id"],
         item["better_law"] or item["status"],

@@ -65,6 +65,7 @@ def list_clutches(
 
 
 def _row(item: JsonObject) -> list[str]:
+    """A clutch as a row of the printed list."""
     held_count = str(item["held"]) if item["held"] else ""
     summary, numbers = item["summary"], ["-", "-", "-"]
     if summary:

@@ -112,6 +112,7 @@ def _table(*columns: str, right: Sequence[str] = ()) -> Table:
 
 
 def _candidates(candidates: Sequence[Mapping[str, Any]]) -> Table:
+    """The table of candidate explanations, with probability and estimated size."""
     table = _table("candidate", "probability", "estimate", right=["probability"])
     for candidate in candidates:
         estimate = candidate["estimate"]
@@ -201,6 +202,7 @@ def _grid(title: str, rows: Sequence[float], columns: Sequence[float], table: _C
 
 
 def _cell(value: float | None, largest: float) -> Text:
+    """One cell of a residual map, marked and coloured by its share of the largest residual."""
     if value is None:
         return Text("  ")
     for share, mark, above, below in _MARKS:
@@ -211,6 +213,7 @@ def _cell(value: float | None, largest: float) -> Text:
 
 
 def _below(mark: str) -> str:
+    """The mark of a negative residual, for the mark of a positive one."""
     return mark.replace("+", "-").replace("#", "=")
 
 
@@ -220,6 +223,7 @@ def _mean(values: Sequence[float | None]) -> float | None:
 
 
 def _gain(report: Mapping[str, Any]) -> Iterator[RenderableType]:
+    """The lines on held-out runs and on remaining life before and after the extended model."""
     gain = report["gain"]
     if gain["rmse_before_nm"] is not None:
         spread = "" if gain["reduction_percent_sd"] is None else f" ± {number(gain['reduction_percent_sd'], 2)}"

@@ -56,6 +56,7 @@ def export(
 
 
 def _export(service: Service, clutch: str, out_folder: Path) -> None:
+    """Write a clutch's record, runs, files and results into a folder, from which `clutchlife push` can restore it."""
     from service.api.clutch import ClutchIn  # start-up time
 
     results = out_folder / "results"
@@ -138,6 +139,7 @@ def _safe(name: str) -> str:
 
 
 def _results(service: Service, clutch: str, folder: Path) -> None:
+    """Write the clutch's results as JSON files."""
     from service.api.life import MethodName  # start-up time
 
     base = f"/v1/clutches/{clutch}"

@@ -122,6 +122,7 @@ def _refresh_on_service(service: Service, *, quiet: bool) -> None:
 
 
 def _line(item: Mapping[str, Any]) -> str:
+    """A fleet's prior as a printed line."""
     kind, population = item["kind"], item["population"]
     kind_text = f"{kind['friction_material']} on {kind['reaction_plate']} in {kind['fluid']}, {kind['origin']}"
     return (

@@ -70,6 +70,7 @@ def _show(items: list[JsonObject]) -> None:
 
 
 def _row(item: Mapping[str, Any]) -> list[str]:
+    """An inspection as a row of the printed table."""
     return [
         item["inspection_id"],
         item["lining"] or "-",

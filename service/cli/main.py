@@ -44,6 +44,7 @@ class Commands(TyperGroup):
     state."""
 
     def invoke(self, ctx: Any) -> Any:
+        """Run a command; a usage error ends it with one line and the right exit code."""
         try:
             return super().invoke(ctx)
         except _UsageError as error:

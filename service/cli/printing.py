@@ -82,6 +82,7 @@ class _Browser:
         self._asked, self._answers, self._numbers = asked, answers, count(1)
 
     def ask(self, method: str, session: str | None = None, **parameters: Any) -> JsonObject:
+        """The browser's result of a method of its DevTools protocol. Raises ReportError."""
         number = next(self._numbers)
         message = {"id": number, "method": method, "params": parameters}
         if session is not None:
@@ -98,6 +99,7 @@ class _Browser:
             return found
 
     def _next(self) -> JsonObject:
+        """The browser's next message."""
         read = bytearray()
         while (byte := self._answers.read(1)) != b"\0":
             if not byte:

@@ -24,7 +24,7 @@ from models.records.runs import Curve, Plateaus, curves_by_pressure, loaded
 from models.records.torque_filter import filtered_as_torque
 from service.channels import PASCALS_PER_BAR, ZERO_CELSIUS
 from service.clutch.criteria import FEWEST_SPEEDS, OTHER_OIL, POOR_FIT, WIDE_LEVEL
-from service.clutch.engagements import Engagement, course_item, engagement_notices, evaluated
+from service.clutch.engagements import EvaluatedEngagement, course_item, engagement_notices, evaluated
 from service.clutch.incoming_run import IncomingRun, SampledChannels, sampled_record, stationary_plateaus
 from service.errors import InvalidError, Notice
 
@@ -72,7 +72,7 @@ class Analysis:
     warnings: tuple[Notice, ...] = ()
     plateaus: Plateaus | None = None
     times: tuple[float, ...] | None = None
-    engagement: Engagement | None = None
+    engagement: EvaluatedEngagement | None = None
 
     def details_to_store(self, run: IncomingRun) -> dict[str, object]:
         """Fields stored with a run's channels: the other sent fields, its range of speeds [rad/s], its oil temperature
@@ -141,6 +141,7 @@ def loops_of(
 def _analyse_stationary(
     plateaus: Plateaus, times: tuple[float, ...] | None, geometry: Geometry, noticed: Sequence[Notice]
 ) -> Analysis:
+    """The analysis of a stationary test's plateaus: fitted curves, speed range, oil, and warnings."""
     under_load = loaded(plateaus)
     noticed = [*_unloaded(plateaus, under_load), *noticed]
     if under_load is None:
@@ -249,6 +250,7 @@ def _oil_moves(oil_range: Value | None) -> list[Notice]:
 
 
 def _unloaded(plateaus: Plateaus, under_load: Plateaus | None) -> list[Notice]:
+    """The warning of plateaus without pressure, which no curve is fitted to."""
     below = f"below {UNLOADED / PASCALS_PER_BAR:g} bar"
     if under_load is None:
         message = (
@@ -262,6 +264,7 @@ def _unloaded(plateaus: Plateaus, under_load: Plateaus | None) -> list[Notice]:
 
 
 def _fit_warnings(level: LevelFit) -> list[Notice]:
+    """The warning of a curve that is undetermined or fits poorly."""
     fit, measured = level.fit, level.measured
     at = f"at {fit.pressure / PASCALS_PER_BAR:g} bar"
     if fit.status is StribeckFitStatus.UNDETERMINED:

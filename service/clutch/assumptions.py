@@ -32,7 +32,7 @@ BASELINE = ModelName(name="baseline", effects=[])
 
 #: Mean COF [d, m] that an adopted model's effects add under each of its draws at cycles since new [m], at a pressure [Pa] or
 #: ALL_PRESSURES.
-Course: TypeAlias = Callable[[FloatArray, float], FloatArray]
+AddedCourse: TypeAlias = Callable[[FloatArray, float], FloatArray]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,7 +42,7 @@ class ModelInForce:
 
     name: ModelName = BASELINE
     weights: tuple[float, ...] = (1.0,)
-    course: Course | None = None
+    course: AddedCourse | None = None
     severity_exponent: float | None = None
     corrected: tuple[str, ...] = ()
 

@@ -153,25 +153,25 @@ def _warning_about_held_runs(payload: Mapping[str, Any], among: Mapping[str, Any
     """The warning about held runs, with their effect on the prediction; the safe bounds may differ even if both
     remaining lives are unknown."""
     if all(among[name] == payload[name] for name in ("status", "remaining_cycles", "at_least")):
-        effect = f"the remaining life would be the same with {_them(count)}"
+        effect = f"the remaining life would be the same with {_pronoun(count)}"
     elif among["status"] == REACHED:
-        effect = f"with {_them(count)} the end of life would be reached"
+        effect = f"with {_pronoun(count)} the end of life would be reached"
     elif among["status"] == INSUFFICIENT and among["at_least"] is None:
-        effect = f"with {_them(count)} nothing could be predicted"
+        effect = f"with {_pronoun(count)} nothing could be predicted"
     elif among["status"] == INSUFFICIENT:
-        effect = f"with {_them(count)} the remaining life is not known: {bound_in_words(among['at_least'])}"
+        effect = f"with {_pronoun(count)} the remaining life is not known: {bound_in_words(among['at_least'])}"
     else:
-        effect = f"with {_them(count)} {interval_in_words(among['remaining_cycles'])} cycles would remain"
+        effect = f"with {_pronoun(count)} {interval_in_words(among['remaining_cycles'])} cycles would remain"
     return Warned(code=HELD_RUNS, message=f"{held_in_words(count)}: {effect}")
 
 
 def held_runs_left_out(count: int) -> list[Warned]:
     """The warning of an answer that leaves this many held runs out; empty if none is held."""
-    message = f"{held_in_words(count)}: this is without {_them(count)}"
+    message = f"{held_in_words(count)}: this is without {_pronoun(count)}"
     return [Warned(code=HELD_RUNS, message=message)] if count else []
 
 
-def _them(count: int) -> str:
+def _pronoun(count: int) -> str:
     return "it" if count == 1 else "them"
 
 
@@ -317,6 +317,7 @@ def _test_in_words(test: str) -> str:
 
 
 def _decides(separates: Sequence[str]) -> str:
+    """The clause that says which causes an advised test distinguishes."""
     effects = [_cause_in_words(effect) for effect in separates if effect != "baseline"]
     if len(effects) == 1:
         return f"it shows whether {effects[0]} is at work"

@@ -22,7 +22,7 @@ from service.clutch.incoming_run import IncomingRun, sampled_record
 from service.errors import Notice
 
 #: The indicators of a run's engagement, or why it has none.
-Engagement: TypeAlias = EngagementIndicators | Refusal
+EvaluatedEngagement: TypeAlias = EngagementIndicators | Refusal
 
 #: Kinds of runs that may carry the record of an engagement.
 DUTY_KINDS = ("duty_cycles", "run_in")
@@ -63,14 +63,14 @@ COMPARED: Mapping[str, Indicator] = {
 ALL_INDICATORS: Mapping[str, Indicator] = {**INDICATORS, **COMPARED}
 
 
-def evaluated(run: IncomingRun, geometry: Geometry) -> Engagement | None:
+def evaluated(run: IncomingRun, geometry: Geometry) -> EvaluatedEngagement | None:
     """The evaluated engagement of a block of duty; None for a run without one."""
     if run.kind not in DUTY_KINDS or not run.channels:
         return None
     return measured_engagement(sampled_record(run.channels), geometry)
 
 
-def engagement_notices(engagement: Engagement | None) -> list[Notice]:
+def engagement_notices(engagement: EvaluatedEngagement | None) -> list[Notice]:
     """The warning of a sent record in which no engagement was found."""
     if not isinstance(engagement, Refusal):
         return []
@@ -78,7 +78,7 @@ def engagement_notices(engagement: Engagement | None) -> list[Notice]:
     return [Notice(code="no_engagement", message=message)]
 
 
-def engagement_item(engagement: Engagement) -> ReceivedEngagement:
+def engagement_item(engagement: EvaluatedEngagement) -> ReceivedEngagement:
     """An engagement as a receipt shows it; undetermined values are null."""
     if isinstance(engagement, Refusal):
         return ReceivedEngagement(
@@ -116,7 +116,7 @@ def _indicator_items(
     return items
 
 
-def course_item(engagement: Engagement | None) -> dict[str, object]:
+def course_item(engagement: EvaluatedEngagement | None) -> dict[str, object]:
     """The course of the sliding speed, to be stored with a run's channels; empty for a run without an engagement."""
     if not isinstance(engagement, EngagementIndicators):
         return {}
@@ -194,6 +194,7 @@ def engagements_over_life(
 
 
 def _row(engagement: StoredEngagement, reference: SpeedCourse | None) -> MeasuredEngagement:
+    """An engagement with all its indicators; those of comparison are null without a reference."""
     if reference is None or engagement.course is None:
         comparison: dict[str, IndicatorEstimate | None] = dict.fromkeys(COMPARED)
     else:

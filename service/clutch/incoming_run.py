@@ -170,6 +170,7 @@ def _require_readings(channels: Mapping[str, FloatArray]) -> None:
 
 
 def _require_curve(torque: FloatArray, speed: FloatArray, pressure: FloatArray) -> None:
+    """Raise InvalidError if pressed rows form no Stribeck curve, or more than a test may have."""
     if torque.size == 1:
         _refuse("torque_nm", torque, "too_few_points", "a Stribeck curve needs more than one point, got 1")
     levels = np.unique(levels_of(pressure * CHANNELS["pressure_bar"].factor)).size

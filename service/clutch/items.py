@@ -113,6 +113,7 @@ def warnings_of_file(run: IncomingRun) -> list[Warned]:
 
 
 def _fit_item(fit: StribeckFit, cof: Value | tuple[None, None]) -> Fit:
+    """A fitted curve as a receipt shows it, with its mean COF."""
     names = [public for public, _ in PARAMETER_UNITS.values()]
     return Fit(
         pressure_bar=bar(fit.pressure),

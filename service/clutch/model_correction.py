@@ -24,7 +24,7 @@ from models.records.runs import Plateaus, loaded
 from service.api.clutch import ClutchIn
 from service.api.life import ModelName
 from service.clutch.analysis import Value, levels_of, mean_cofs
-from service.clutch.assumptions import ALL_PRESSURES, Course, ModelInForce
+from service.clutch.assumptions import ALL_PRESSURES, AddedCourse, ModelInForce
 from service.clutch.criteria import COURSE_PROBES
 from service.clutch.diagnosis.campaign import CampaignRun, campaign_of, run_of, without_record
 from service.clutch.incoming_run import IncomingRun
@@ -75,6 +75,7 @@ class RunReader:
                 yield run
 
     def _cut(self, event: Event, life: Life) -> CampaignRun:
+        """A run of a life as the diagnosis reads it, its record cut into plateaus."""
         run = replace(self.read(event.run_id), cycles=event.cycles)
         return run_of(run, origin=life.origin, torque_filter=self.torque_filter)
 
@@ -185,7 +186,7 @@ def model_in_force(extension: Extension, life: Life, geometry: Geometry) -> Mode
     )
 
 
-def added_course(extension: Extension, life: Life, geometry: Geometry) -> Course | None:
+def added_course(extension: Extension, life: Life, geometry: Geometry) -> AddedCourse | None:
     """Mean COF [d, m] added by the effects of use at cycles since new [m] at a pressure [Pa] (0: the reference
     pressures).
 
@@ -201,6 +202,7 @@ def added_course(extension: Extension, life: Life, geometry: Geometry) -> Course
 
     @cache  # asked for the same cycles at every run
     def added(cycles: tuple[float, ...], pressure: float) -> FloatArray:
+        """The added mean COF [d, m] at cycles since new, at a pressure or over the reference pressures (0)."""
         levels = np.array([pressure]) if pressure else reference
         per_cof = np.array([geometry.torque_per_cof(float(level)) for level in levels])
         since = np.maximum(np.array(cycles) - life.origin, 0.0)

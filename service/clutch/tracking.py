@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 
 from models.arrays import FloatArray
 from models.prognosis.back_cast import BackCast, kept_after
-from models.prognosis.course_shares import course_shares
+from models.prognosis.course_shares import CourseProbability, course_shares
 from models.prognosis.criteria import FEWEST_TESTS
-from models.prognosis.first_passage import Offset, horizon_at, predict_first_passage
+from models.prognosis.first_passage import FirstPassage, Offset, horizon_at, predict_first_passage
 from models.prognosis.stated_end import StatedEnd, stated_end
 from models.tracking.criteria import FEWEST_BEFORE
 from models.tracking.filters.grid import Grid, GridState
@@ -229,12 +229,14 @@ def drawn(method: str, series: Series, tracked: Tracked) -> TrackPosterior:
 
 
 def _posterior(method: str, state: FilterState, size: int, rng: np.random.Generator) -> TrackPosterior:
+    """Weighted draws from a filter's state."""
     if method == CARRIED and isinstance(state, UkfState):
         return _UKF.particle.posterior(state.particles, size, rng)
     return _COMPUTED.get(method, _UKF).posterior(state, size, rng)
 
 
 def _purpose(method: str, prior: str) -> str:
+    """The name of a random stream, by method and prior."""
     return method if prior == WEAK else f"{method}-{prior}"
 
 
@@ -254,71 +256,112 @@ def predict(
     answer = items.insufficient(series.assumptions, cycles, series.pressure, fraction)
     if tracked is None:
         return answer
-    runs, scale = tracked.runs, series.scale
-    sample = drawn(method, series, tracked)
+    end = _predicted_end(method, series, tracked, cycles, fraction)
+    runs = tracked.runs
+    warnings = [
+        *notices.left_out(tests, runs),
+        *notices.new_level([at for at in series.new_levels if at <= cycles]),
+        *notices.off_track(tracked.back_cast, series.measurements[runs - 1].value),
+    ]
+    answer = _with_last_value(answer, series, runs, cycles, end)
+    if len({measurement.progress for measurement in series.measurements[:runs]}) < FEWEST_TESTS:
+        return answer.model_copy(update={"warnings": items.warned(warnings)})  # what else the prior says is no finding
+    courses = course_shares(end.sample)
+    warnings += [
+        *notices.not_eq_6(courses),
+        *notices.approximate(method, courses),
+        *notices.new_extrapolated(series, end.stated.late, fraction),
+        *notices.missed(tracked.back_cast),
+    ]
+    answer = _with_end(answer, series, cycles, fraction, end).model_copy(
+        update={"course": _course_item(courses), "back_cast": _back_cast_item(tracked.back_cast)}
+    )
+    return answer.model_copy(update={"warnings": items.warned(warnings)})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _PredictedEnd:
+    """The end of life that a weighted sample predicts: as stated, as the first passage of the limit, and its quantiles in
+    cycles since new; the horizon [cycles]."""
+
+    sample: TrackPosterior
+    stated: StatedEnd
+    passage: FirstPassage
+    quantiles: Mapping[float, float | None]
+    horizon: float
+
+
+def _predicted_end(method: str, series: Series, tracked: Tracked, cycles: float, fraction: float) -> _PredictedEnd:
+    """The end of life that the draws of a filter predict as of `cycles`."""
+    sample, scale = drawn(method, series, tracked), series.scale
     horizon_cycles = horizon_at(cycles - scale.origin)
     horizon = float(scale.progress(scale.origin + horizon_cycles))
-    end = end_of_life(sample, series, tracked, cycles, fraction, horizon)
+    stated = end_of_life(sample, series, tracked, cycles, fraction, horizon)
     passage = predict_first_passage(
         sample,
         fraction=fraction,
         as_of=float(scale.progress(cycles)),
         horizon=horizon,
         offset=offset_of(series),
-        stated=(end.ends, end.weight),
-        initial=None if end.late is None else end.late.initial,
+        stated=(stated.ends, stated.weight),
+        initial=None if stated.late is None else stated.late.initial,
     )
-    ends = {q: None if zeta is None else float(scale.cycles(zeta)) for q, zeta in passage.end_of_life.items()}
+    quantiles = {q: None if zeta is None else float(scale.cycles(zeta)) for q, zeta in passage.end_of_life.items()}
+    return _PredictedEnd(sample=sample, stated=stated, passage=passage, quantiles=quantiles, horizon=horizon_cycles)
+
+
+def _with_last_value(
+    answer: LifePrediction, series: Series, runs: int, cycles: float, end: _PredictedEnd
+) -> LifePrediction:
+    """The prediction with the last measured value and the safe bound."""
     measured_at, (value, sd) = series.as_measured(runs - 1)
     measured = {"mean_cof": value, "mean_cof_sd": sd, "measured_at_cycles": whole(round(measured_at, 3))}
-    warnings = [
-        *notices.left_out(tests, runs),
-        *notices.new_level([at for at in series.new_levels if at <= cycles]),
-        *notices.off_track(tracked.back_cast, series.measurements[runs - 1].value),
-    ]
-    known = {
-        "runs_used": runs,
-        "current": answer.current.model_copy(update=measured),
-        "horizon_cycles": whole(horizon_cycles),
-        "at_least": items.safe_bound(ends[items.SAFE], cycles, scale.origin),
-        "warnings": items.warned(warnings),
-    }
-    answer = answer.model_copy(update=known)
-    if len({measurement.progress for measurement in series.measurements[:runs]}) < FEWEST_TESTS:
-        return answer  # what else the prior makes of the tests is no finding
-    courses, back_cast = course_shares(sample), tracked.back_cast
-    warnings += [
-        *notices.not_eq_6(courses),
-        *notices.approximate(method, courses),
-        *notices.new_extrapolated(series, end.late, fraction),
-        *notices.missed(back_cast),
-    ]
-    course, *alternatives = (
-        CourseShare(name=share.name.value, probability=share.probability, order=share.order) for share in courses
+    return answer.model_copy(
+        update={
+            "runs_used": runs,
+            "current": answer.current.model_copy(update=measured),
+            "horizon_cycles": whole(end.horizon),
+            "at_least": items.safe_bound(end.quantiles[items.SAFE], cycles, series.scale.origin),
+        }
     )
+
+
+def _with_end(
+    answer: LifePrediction, series: Series, cycles: float, fraction: float, end: _PredictedEnd
+) -> LifePrediction:
+    """The prediction with the present state, and the end of life in cycles since new and from now."""
+    passage, ends = end.passage, end.quantiles
     mean, deviation = passage.current
-    earlier, later = back_cast.widening
     left = mean / passage.initial if passage.initial > 0 else None
     health = None if left is None else items.share_of_way(left, 1.0, fraction)
     now = {"mean_cof": mean, "mean_cof_sd": deviation, "fraction_of_initial": left, "health": health}
-    predicted = {
-        "status": passage.status.value,
-        "criterion": items.criterion_item(fraction, series.pressure, passage.initial, passage.threshold),
-        "current": answer.current.model_copy(update=now),
-        "remaining_cycles": items.by_quantile(
-            {q: None if at is None else max(0.0, at - cycles) for q, at in ends.items()}
-        ),
-        "end_of_life_cycles": items.by_quantile(ends),
-        "probability_of_reaching": passage.probability_of_reaching,
-        "back_cast": BackCastCount(
-            held=back_cast.held, of=back_cast.misses.size, widening=earlier, widening_later=later
-        ),
-        "ended_lives": end.lives,
-        "sample": SampleQuality(effective_draws=sample.effective_draws, status=sample.status.value),
-        "course": Course(**dict(course), alternatives=alternatives),
-        "warnings": items.warned(warnings),
-    }
-    return answer.model_copy(update=predicted)
+    remaining = {q: None if at is None else max(0.0, at - cycles) for q, at in ends.items()}
+    return answer.model_copy(
+        update={
+            "status": passage.status.value,
+            "criterion": items.criterion_item(fraction, series.pressure, passage.initial, passage.threshold),
+            "current": answer.current.model_copy(update=now),
+            "remaining_cycles": items.by_quantile(remaining),
+            "end_of_life_cycles": items.by_quantile(ends),
+            "probability_of_reaching": passage.probability_of_reaching,
+            "ended_lives": end.stated.lives,
+            "sample": SampleQuality(effective_draws=end.sample.effective_draws, status=end.sample.status.value),
+        }
+    )
+
+
+def _course_item(courses: Sequence[CourseProbability]) -> Course:
+    """The most probable course, with the others as alternatives."""
+    course, *alternatives = (
+        CourseShare(name=share.name.value, probability=share.probability, order=share.order) for share in courses
+    )
+    return Course(**dict(course), alternatives=alternatives)
+
+
+def _back_cast_item(back_cast: BackCast) -> BackCastCount:
+    """How many tests lay within their forecasts, and how much remaining life is widened for it."""
+    earlier, later = back_cast.widening
+    return BackCastCount(held=back_cast.held, of=back_cast.misses.size, widening=earlier, widening_later=later)
 
 
 def _innovation(method: str, series: Series, tracked: Tracked) -> list[float]:
@@ -397,6 +440,7 @@ def predict_at(
 
 
 def _level(life: Life | None, pressure_bar: float) -> float:
+    """The pressure of the reference test nearest to the requested one. Raises NotFoundError."""
     levels = [] if life is None else sorted(life.reference)
     level = nearest_pressure(pressure_bar * PASCALS_PER_BAR, levels)
     if level is None:

@@ -266,6 +266,7 @@ class Processes(_RemoteExecutor):
         return INPUTS_AHEAD * self.processes
 
     def submit(self, function: Callable[[Any], Any], item: Any) -> "Future[Any]":
+        """Send the call to the pool; a pool with an ended process is replaced."""
         with self._lock:
             if self._closed:
                 raise RuntimeError("the executor is closed")
@@ -290,6 +291,7 @@ class _Pool(ProcessPoolExecutor):
 
 
 def _begin() -> None:
+    """Prepare a process of the pool."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     end_with_parent()
     yield_to_others()
@@ -468,10 +470,12 @@ def _round(
     compute: Callable[[Item], Result],
     store: Callable[[Item, Result], bool],
 ) -> Iterator[Ended[Result]]:
+    """One round of `in_rounds`: each name is loaded, computed and stored once."""
     numbers, sent = count(), dict[int, tuple[str, Item]]()
     not_sent: list[Ended[Result]] = []
 
     def items() -> Iterator[Item]:
+        """The inputs as they are loaded; names without one are noted in `not_sent`."""
         for name in names:
             try:
                 item = load(name)

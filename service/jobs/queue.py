@@ -66,6 +66,7 @@ def work_of_change(function: str) -> Callable[[JobRow, Settings], Work]:
     """
 
     def work(job: JobRow, settings: Settings) -> Work:
+        """The task of a job's process."""
         task = {
             "function": function,
             "of": job.of,
@@ -190,6 +191,7 @@ class JobQueue:
         return claimed
 
     def _do(self, job: JobRow, kind: JobKind) -> None:
+        """Run a claimed job and store its end; no error of it reaches the next job."""
         try:
             request_id.set(job.arguments["request"])
             ended = self._outcome(job, kind)
@@ -219,6 +221,7 @@ class JobQueue:
             renewing.join()
 
     def _renew_until(self, done: threading.Event, job: JobRow) -> None:
+        """Prolong the job's lease until `done`."""
         while not done.wait(self._pause) and self._renewed(job, {"step": "stores"}):
             pass
 
@@ -269,6 +272,7 @@ class JobQueue:
         return True
 
     def _released(self, job: JobRow) -> None:
+        """Give the job back, so that another service may claim it at once."""
         try:
             with self._database.writing(of=self._name) as connection:
                 jobs.release(connection, job.job_id, self._name)
@@ -276,6 +280,7 @@ class JobQueue:
             _log.warning("job %s is repeated once its lease has expired: %s", job.job_id, error)
 
     def _renewed(self, job: JobRow, progress: Json | None) -> bool:
+        """Prolong the job's lease; false if this service holds it no longer or it was cancelled."""
         try:
             with self._database.writing(of=self._name) as connection:
                 return jobs.renew(connection, job.job_id, self._name, progress=progress)

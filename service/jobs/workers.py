@@ -305,6 +305,7 @@ class Workers:
             return call
 
     def _do(self, call: _Call, worker: _Worker) -> None:
+        """Make a call and answer it; if its process ended, queue it once more."""
         error: BaseException | None = None
         result, retry = None, False
         try:

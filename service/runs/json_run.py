@@ -51,6 +51,7 @@ def read_run(body: bytes) -> IncomingRun:
 
 
 def _run(sent: Any) -> IncomingRun:
+    """The run in a parsed body. Raises InvalidError."""
     run = _validated(RUN_IN.validate_json, sent)
     channels = getattr(run, "channels", None)
     channel_values = () if channels is None else channels.model_dump(exclude_none=True)
@@ -176,6 +177,7 @@ def _validated(validate: Callable[[bytes], Answer], sent: object, items: int = _
 
 
 def _cut(value: Any, items: int) -> Any:
+    """A parsed value with long texts, lists and objects shortened."""
     if isinstance(value, dict):
         return {name[:items]: _cut(item, items) for name, item in value.items()}
     if isinstance(value, list):

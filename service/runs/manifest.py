@@ -125,6 +125,7 @@ def _listed(folder: Path) -> dict[Path, dict[str, str]]:
 
 
 def _entry(manifest: Path, index: int, entry: object) -> tuple[Path, dict[str, str]]:
+    """The file of a manifest's entry, and the parameters to send it with. Raises ValueError, FileNotFoundError."""
     at = f"{manifest}[{index}]"
     if not isinstance(entry, dict) or not set(_NEEDED) <= entry.keys() <= {*_NEEDED, *_OPTIONAL}:
         rule = f"must have the fields {', '.join(_NEEDED)}, and may have {', '.join(_OPTIONAL)}"

@@ -66,6 +66,7 @@ def _write_csv(path: Path, channels: Mapping[str, FloatArray], head: Mapping[str
 
 
 def _write_tdms(path: Path, channels: Mapping[str, FloatArray], head: Mapping[str, Any]) -> None:
+    """Write channels as a TDMS file, with `head` as its properties."""
     from nptdms import ChannelObject, RootObject, TdmsWriter  # type: ignore[import-untyped]  # start-up time, optional package
 
     objects = [RootObject(properties=dict(head))]

@@ -69,6 +69,7 @@ def simulated_inspection(surface: Surface, cycles: float) -> dict[str, object]:
 
 
 def _columns(data: Plateaus | Record) -> dict[str, FloatArray | None]:
+    """The measured columns by public channel name, in SI units; None if not measured."""
     columns = {
         "pressure_bar": data.pressure,
         "speed_rpm": data.speed,
@@ -135,6 +136,7 @@ def _steps_from_csv(text: str) -> dict[int, list[Any]]:
 
 
 def _planned(place: str, given: Mapping[str, Any]) -> PlannedTest:
+    """A step of a plan as a test of the simulated rig. Raises ValueError, which names the `place`."""
     try:
         step = PlanStep.model_validate(given)
     except ValidationError as error:

@@ -142,6 +142,7 @@ def _columns(reading: Reading, titles: Sequence[str]) -> list[RigColumn]:
 
 
 def _as_argument(choice: ColumnChoice) -> str:
+    """A chosen column as an argument of the upload."""
     return choice.column if choice.unit is None else f"{choice.column} [{choice.unit}]"
 
 

@@ -64,6 +64,7 @@ def _read_run(
     profile: RigProfile | None,
     rig: str | None,
 ) -> IncomingRun:
+    """The run in a file: its table read, and kind, cycles and name as given or found by the rig profile."""
     read = read_file(path, filename=filename, reading=reading)
     stated = Named() if profile is None else named(profile, filename, read.labels)
     kind, cycles = kind or stated.kind, stated.cycles if cycles is None else cycles

@@ -155,6 +155,7 @@ def _digest(text: str) -> str:
 
 
 def _require_direct(request: Request) -> None:
+    """Raise ForbiddenError if a request without a key comes through a proxy or from another machine."""
     proxy = "HTTP/1.0" if request.scope["http_version"] == _VERSION_OF_PROXIES else None
     for name, _ in request.scope["headers"]:
         if name in _OF_PROXIES or _FORWARDED in name or name.endswith(_CLIENT_IP):
@@ -170,6 +171,7 @@ def _require_direct(request: Request) -> None:
 
 
 def _require_own_host(request: Request) -> None:
+    """Raise ForbiddenError if a request without a key names another host, or comes from another site's page."""
     host, origin = request.headers.get("host", "").strip(), request.headers.get("origin")
     name = host[1:].partition("]")[0] if host.startswith("[") else host.partition(":")[0]
     if not is_loopback(name):
@@ -201,6 +203,7 @@ def allowed(scope: Scope, *, narrowed: bool = False) -> Callable[[Request], Awai
     """A FastAPI dependency: returns the service's context if `authorise` allows the request, else raises its error."""
 
     async def check(request: Request) -> Context:
+        """The context, for a caller whose key has the scope for this route. Raises UnauthorizedError, ForbiddenError."""
         context, clutch_id = context_of(request), clutch_of(request)
         snapshot = getattr(request.state, "snapshot", None) or await snapshot_at(request, clutch_id)
         grant = authorise(request, snapshot, scope, clutch_id, narrowed=narrowed)

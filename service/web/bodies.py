@@ -172,6 +172,7 @@ class Bodies:
                 raise TooSlowError(f"only {body.taken} bytes of the body arrived in {clock() - begun:.0f} s") from None
 
         async def counted() -> Message:
+            """The next message of the body, counted against the limits."""
             nonlocal begun, whole
             if whole:  # what comes now is that the caller has gone
                 return await receive()
@@ -222,6 +223,7 @@ class _RequestBody:
             self._hold(place, 0)
 
     def _hold(self, place: str, size: int) -> bool:
+        """Reserve this many bytes in memory or on disk; false if there is no room."""
         has_room = self._rooms[place].take(size - self._held[place])
         self._held[place] = size if has_room else self._held[place]
         return has_room

@@ -64,6 +64,7 @@ def bounded(
             self._refused = False
 
         def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+            """Refuse the connection if its address has too many, and limit what waits to be sent on it."""
             super().connection_made(transport)
             transport.set_write_buffer_limits(high=0)  # paused is: the reader has not taken all that was written
             line = transport.get_extra_info("socket")
@@ -76,6 +77,7 @@ def bounded(
             self._expect_head()
 
         def data_received(self, data: bytes) -> None:
+            """Parse received bytes in pieces, and refuse a head that is too large."""
             in_body = self.cycle is not None and self.cycle.more_body
             step = len(data) if in_body else _PIECE
             for start in range(0, len(data), step):

@@ -50,6 +50,7 @@ class KeyUses:
 
 
 def _store(database: Database, key_id: str) -> None:
+    """Store that a key was used; a database that is away is only logged."""
     try:
         with database.writing(of=key_id) as connection:
             keys.note_use(connection, key_id, datetime.now(UTC).isoformat(timespec="seconds"))

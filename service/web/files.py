@@ -172,6 +172,7 @@ class Copies:
             ending.add_done_callback(self._ending.discard)
 
     async def _written(self, tag: str, make: Callable[[Path], "Future[Any]"]) -> "Copy":
+        """A new copy, written by `make`. Raises BusyError if copies have no room left."""
         if self._room.left <= 0:
             raise BusyError(_NO_ROOM)
         async with temporary_folder(self._folder) as folder:

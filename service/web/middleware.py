@@ -89,6 +89,7 @@ class Shares(_OfRequests):
                     self._keys.popitem(last=False)
 
     def _share_of(self, sent: bytes | None, client: tuple[str, int] | None) -> "_Share":
+        """The share of a caller, by its known key or else its address."""
         name = self._keys.get(sent or b"") or ("" if client is None else client[0])
         full = _Share(limits.SAVED_SECONDS * self.per_second, time.monotonic())
         share = self._shares.setdefault(name, full)
@@ -169,9 +170,11 @@ class Edge(_OfRequests):
             await self._answered(scope, receive, send, own_id, span)
 
     async def _answered(self, scope: Scope, receive: Receive, send: Send, own_id: str, span: Span) -> None:
+        """Answer a request inside its span; its status, bytes and seconds are noted at the end."""
         status, size, started = 0, 0, time.perf_counter()
 
         async def noting(message: Message) -> None:
+            """Send a message with the headers of all answers, and note status and bytes."""
             nonlocal status, size
             if message["type"] == "http.response.start":
                 status = message["status"]
@@ -195,6 +198,7 @@ class Edge(_OfRequests):
             self._note(scope, status or 500, size, time.perf_counter() - started, span)
 
     def _note(self, scope: Scope, status: int, size: int, seconds: float, span: Span) -> None:
+        """Count, time and log an answered request under its route."""
         route = route_of(Request(scope))
         method = scope["method"] if route != UNMATCHED else "any"
         span.update_name(f"{method} {route}")
@@ -235,7 +239,7 @@ class Polls(_OfRequests):
         if path in self._places:
             route, clutch_id = self._places[path]
             again = context_of(Request(scope)).answers.again((path, _arguments(route, query)))
-            if again is not None and (response := await _answered(route, clutch_id, again, scope)) is not None:
+            if again is not None and (response := await _from_cache(route, clutch_id, again, scope)) is not None:
                 await response(scope, receive, send)
                 return
         await self.app(scope, receive, send)
@@ -249,7 +253,8 @@ class Polls(_OfRequests):
             context_of(request).answers.remember(asked, again, limits.MAX_POLLED)
 
 
-async def _answered(route: Any, clutch_id: str | None, again: Again, scope: Scope) -> Response | None:
+async def _from_cache(route: Any, clutch_id: str | None, again: Again, scope: Scope) -> Response | None:
+    """The cached response for a caller who may read it; None if the route has to answer."""
     request = Request(scope)
     try:
         context = context_of(request)
@@ -349,6 +354,7 @@ class Encodings(_OfRequests):
             headers["if-none-match"] = wanted_tags.replace(_PACKED, '"')
 
         async def tagged(message: Message) -> None:
+            """Send a message; the entity tag of compressed bytes gets its mark."""
             if message["type"] == "http.response.start":
                 answered = MutableHeaders(scope=message)
                 tag = answered.get("etag", "").removesuffix('"') + _PACKED
@@ -379,6 +385,7 @@ class Answers(_OfRequests):
         is_refused = False
 
         async def in_pieces(message: Message) -> None:
+            """Send a message, a long body in pieces."""
             nonlocal start, is_refused
             if message["type"] == "http.response.start":
                 start = message  # goes with the first bytes: until then the answer may become another
@@ -423,6 +430,7 @@ class RootPath(_OfRequests):
         path = scope["path"]
 
         async def addressed(message: Message) -> None:
+            """Send a message with addresses relative to this service and below its root path."""
             if message["type"] == "http.response.start":
                 headers = MutableHeaders(scope=message)
                 if "location" in headers:

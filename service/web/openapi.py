@@ -127,6 +127,7 @@ def _content(part: Json) -> str:
 
 
 def _refer(part: Any, names: dict[str, str]) -> None:
+    """Replace references to local definitions by those of the whole document, in place."""
     if isinstance(part, list):
         for item in part:
             _refer(item, names)

@@ -53,6 +53,7 @@ def problem(
     total: int = 0,
     suggestion: Suggestion | None = None,
 ) -> Response:
+    """An error response as RFC 9457 has it, with the headers that its status needs."""
     body = Problem(
         type=f"urn:clutchlife:problem:{slug}",
         title=title,
@@ -78,6 +79,7 @@ def refused(kind: type[ServiceError], detail: str) -> Response:
 
 
 def _shown(error: FieldError) -> ProblemError:
+    """An error of one field, in printable characters."""
     return ProblemError(
         pointer=error.pointer,
         row=error.row,
@@ -109,6 +111,7 @@ def _service_error(_: Request, error: ServiceError) -> Response:
 
 
 def _storage_error(_: Request, error: StorageError) -> Response:
+    """The response to an error of the database or of the store of raw records."""
     if isinstance(error, UnstorableText):
         return refused(InvalidError, str(error))
     _log.error("storage: %s", error)
@@ -130,6 +133,7 @@ def _request_error(request: Request, error: RequestValidationError) -> Response:
 
 
 def _argument_error(details: Mapping[str, Any]) -> FieldError:
+    """pydantic's error of one argument as a FieldError."""
     name = ".".join(str(part) for part in details["loc"][1:])
     shown = repr(details.get("input"))[:80]
     return FieldError(

@@ -65,6 +65,7 @@ class Readiness:
         self._raw_thread.shutdown(wait=False)
 
     def _look(self) -> dict[str, str]:
+        """The faults that keep the service from working, each a sentence by what it concerns."""
         wrong = self._database.faults(least_free=self._least_disk)
         if "database" not in wrong and (away := self._fault_of_raw_records()) is not None:
             wrong["raw"] = away
@@ -90,6 +91,7 @@ class Readiness:
             return f"the store of raw records has not answered for {LONGEST_RAW_LOOK_SECONDS:g} s"
 
     def _look_at_raw_records(self) -> str | None:
+        """The fault of the store of raw records; None if it answers and is this database's."""
         try:
             with self._database.reading() as connection:
                 store = raw_stores.in_use(connection)

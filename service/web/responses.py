@@ -81,6 +81,7 @@ def encode_table(columns: Sequence[str], rows: Sequence[Cells]) -> bytes:
 
 
 def _cell(value: object) -> object:
+    """A value as CSV has it: null is empty, and text like a formula is quoted by an apostrophe."""
     if isinstance(value, str) and value.startswith(_FORMULA):
         return f"'{value}"
     return "" if value is None else value
@@ -268,6 +269,7 @@ async def _computed(
     prefer: str | None,
     lane: Lane = Lane.ANSWERS,
 ) -> tuple[int, CachedAnswer]:
+    """The revision and the answer of an expensive query: cached, or computed by a worker, as long as the caller waits."""
     context, clutch_id = of.context, of.clutch_id
     preferred = preferred_wait(prefer)
     wait = preferred if preferred is not None else WAIT_SECONDS if context.workers.are_idle() else 0

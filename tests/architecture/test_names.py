@@ -16,3 +16,27 @@ def test_a_class_name_exists_once() -> None:
                 places[node.name].append(f"{module.shown}:{node.lineno}")
     twice = [f"{name}: {', '.join(found)}" for name, found in sorted(places.items()) if len(found) > 1]
     none_of(twice, "names of more than one class:")
+
+
+#: Aliases that still have the name of a class elsewhere.
+YET = {
+    "models.diagnosis.design.facts": "Run",
+    "models.diagnosis.explanations.posterior": "Kinds",
+    "service.readers.sandbox": "Answer",
+}
+
+
+def test_an_alias_of_a_type_has_no_class_s_name() -> None:
+    """An annotated argument of a route or of a command may: it is the field of that name."""
+    classes = {
+        node.name for module in by_name().values() for node in ast.walk(module.tree) if isinstance(node, ast.ClassDef)
+    }
+    found = []
+    for module in by_name().values():
+        for node in module.tree.body:
+            target = node.targets[0] if isinstance(node, ast.Assign) else getattr(node, "target", None)
+            if not isinstance(target, ast.Name) or target.id not in classes or YET.get(module.name) == target.id:
+                continue
+            if not ast.unparse(node.value).startswith(("TypeVar(", "Annotated[")):  # type: ignore[attr-defined]
+                found.append(f"{module.shown}:{node.lineno} {target.id}")
+    none_of(found, "aliases with the name of a class:")

@@ -110,6 +110,7 @@ def _diagnosed(service: Service, clutch_id: str, end: float | None) -> None:
 
 
 def _row(prediction: JsonObject, end: float | None) -> str:
+    """A prediction as a line of the demo's table, with the true remaining life beside it."""
     current, remaining = prediction["current"], prediction["remaining_cycles"]
     cof = f"{current['mean_cof']:.4f} ± {current['mean_cof_sd']:.4f}"
     interval = f"{_count(remaining['0.05'])} … {_count(remaining['0.95'])}"
@@ -155,6 +156,7 @@ def _service(folder: Path) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
 
 
 def _await_ready(service: Service, process: subprocess.Popen[bytes], log: Path) -> None:
+    """Wait until the demo's service answers; the command ends if the service does not start."""
     deadline = time.monotonic() + _START_SECONDS
     while time.monotonic() < deadline:
         if process.poll() is not None:

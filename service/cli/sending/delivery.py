@@ -64,7 +64,7 @@ _MAX_UNANSWERED = 2
 #: What receipts call the name of a run and of an inspection.
 _NAMES = {RUNS: "run_id", INSPECTIONS: "inspection_id"}
 
-Report = Callable[[str], None]
+ShowLine = Callable[[str], None]
 
 
 @dataclass(slots=True)
@@ -83,7 +83,7 @@ class Sent:
         return f"{self.stored} stored now, {self.duplicates} stored before, {self.refused} refused"
 
 
-def deliver(service: Service, spool: Spool, sent: Sent, report: Report, on_run: Callable[[], None]) -> None:
+def deliver(service: Service, spool: Spool, sent: Sent, report: ShowLine, on_run: Callable[[], None]) -> None:
     """Send all waiting entries of a spool and count them in `sent`; the caller holds `spool.sending`. `on_run` is
     called after each entry that still waited.
 
@@ -113,7 +113,7 @@ def _present(service: Service, spool: Spool) -> bool:
         return False
 
 
-def _send(service: Service, spool: Spool, entry: Entry, sent: Sent, report: Report) -> None:
+def _send(service: Service, spool: Spool, entry: Entry, sent: Sent, report: ShowLine) -> None:
     """Send one entry; raises NoLongerWantedError if it no longer waits, and the errors of `deliver`."""
     answer = "sent, but no answer was received"
     spool.note(entry, tries=entry.tries + 1, last_try=entries.stamp(), last_answer=answer, perhaps_stored=True)
@@ -144,13 +144,15 @@ def _send(service: Service, spool: Spool, entry: Entry, sent: Sent, report: Repo
         report(line)
 
 
-def _stays(spool: Spool, entry: Entry, sent: Sent, report: Report, reason: str) -> None:
+def _stays(spool: Spool, entry: Entry, sent: Sent, report: ShowLine, reason: str) -> None:
+    """Count and report a failed attempt; the file stays in the spool."""
     sent.failed += 1
     spool.note(entry, failures=entry.failures + 1)
     report(f"not accepted, {reason}: {entry.label} stays in the spool, {spool.body(entry)}")
 
 
-def _refused(spool: Spool, entry: Entry, error: RefusedError, report: Report) -> None:
+def _refused(spool: Spool, entry: Entry, error: RefusedError, report: ShowLine) -> None:
+    """Set a refused file aside, and report why and what to do."""
     aside = spool.refuse(entry, error.problem)
     place = "a newer version has replaced it" if aside is None else str(aside)
     report(f"{entry.label} is refused, {error}; kept: {place}")

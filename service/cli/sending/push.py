@@ -105,6 +105,7 @@ def _request(
 
 
 def _replacement(spool: Spool, entry: Entry) -> str:
+    """The line on a waiting file that a newer version replaces."""
     kept = f"the old version is kept in {spool.body(entry)}"
     if entry.perhaps_stored:
         kept += "; one attempt got no answer, so the old version may be stored: if so, withdraw it"
@@ -236,10 +237,12 @@ def _spooled_entries(folder: Path, clutch: str | None) -> list[Entry]:
 
 
 def _owner(entry: Entry) -> tuple[str, str]:
+    """The service and the clutch that a file is sent to."""
     return entry.url, entry.clutch_id
 
 
 def _item(folder: Path, entry: Entry) -> JsonObject:
+    """A waiting or refused file as JSON."""
     head = entry.head
     return {
         "state": entry.state,
@@ -269,6 +272,7 @@ def _print(folder: Path, kept: list[Entry]) -> None:
 
 
 def _line(entry: Entry) -> str:
+    """A waiting or refused file as a printed line."""
     head = entry.head
     kind = "inspection" if entry.resource == INSPECTIONS else head.kind or "kind not stated"
     cycles = "cycles not stated" if head.cycles is None else f"{head.cycles:g} cycles"

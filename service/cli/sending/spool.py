@@ -81,6 +81,7 @@ def head_of_file(parameters: Mapping[str, str], measurements: str) -> RunHead:
 
 
 def _stated(run: Mapping[str, Any]) -> RunHead:
+    """The head of a run as its file states it; None for each field that is missing or unusable."""
     try:
         cycles: float | None = float(run.get("cycles", "none"))
     except (TypeError, ValueError, OverflowError):
@@ -92,6 +93,7 @@ def _stated(run: Mapping[str, Any]) -> RunHead:
 
 
 def _filled(value: object) -> str | None:
+    """A text; None for anything else and for an empty one."""
     return value if isinstance(value, str) and value else None
 
 
@@ -158,6 +160,7 @@ _KNOWN = {item.name for item in fields(Entry)} - set(_COLUMNS)
 
 
 def _body(number: int, digest: str) -> str:
+    """The name of the file that holds an entry's body."""
     return f"{number:08d}-{digest}{BODY}"
 
 
@@ -170,6 +173,7 @@ def _put(database: sqlite3.Connection, entry: Entry) -> None:
 
 
 def _entry(row: Sequence[Any]) -> Entry:
+    """The entry of a row of the spool's database."""
     known = json.loads(row[len(_COLUMNS)])
     values = dict(zip(_COLUMNS, row, strict=False)) | {name: known[name] for name in _KNOWN & known.keys()}
     return Entry(**values | {"head": RunHead(**known["head"]), "sources": tuple(known["sources"])})
@@ -199,7 +203,7 @@ def _opened(path: Path, patience: float) -> Iterator[sqlite3.Connection]:
         raise OSError(f"{path} cannot be used ({error}): a spool is a local folder that can be written") from error
 
 
-def _there(database: sqlite3.Connection, entry: Entry) -> Entry | None:
+def _if_waiting(database: sqlite3.Connection, entry: Entry) -> Entry | None:
     """The present state of an entry; None if it no longer waits."""
     row = database.execute(_THERE, (entry.number, entry.digest)).fetchone()
     return None if row is None else _entry(row)
@@ -268,7 +272,7 @@ class Spool:
     def awaits(self, entry: Entry) -> bool:
         """Whether an entry is still to be sent: no other process sent it, and no newer version replaced it."""
         with self._changing() as database:
-            return _there(database, entry) is not None
+            return _if_waiting(database, entry) is not None
 
     def begin(self) -> None:
         """Repair the spool after a killed process; call it before the first run is sent."""
@@ -330,7 +334,7 @@ class Spool:
             head = head_of_body(partial.read_bytes())
         else:
             head = head_of_file(parameters, measurements)
-            sha256.update(_text(parameters))
+            sha256.update(_sorted_json(parameters))
         entry = Entry(
             number=number,
             url=self.url,
@@ -348,14 +352,14 @@ class Spool:
     def note(self, entry: Entry, **changes: Any) -> None:
         """Update an entry's fields if it still waits. Errors are ignored, because a full disk must not prevent sending."""
         with suppress(OSError), self._changing() as database:
-            current = _there(database, entry)
+            current = _if_waiting(database, entry)
             if current is not None:
                 _put(database, replace(current, **changes))
 
     def done(self, entry: Entry) -> bool:
         """Remove an entry stored by the service, with its refused or replaced copies; true if it still waited."""
         with self._changing() as database:
-            waited = _there(database, entry) is not None
+            waited = _if_waiting(database, entry) is not None
             numbers = database.execute(_COPIES, (self.url, self.clutch_id, entry.digest, entry.number)).fetchall()
             self._remove(database, [(number, _body(number, entry.digest)) for (number,) in numbers])
             return waited
@@ -363,7 +367,7 @@ class Spool:
     def refuse(self, entry: Entry, problem: JsonObject) -> Path | None:
         """Set a refused entry aside with the service's answer; returns its path, None if it no longer waits."""
         with self._changing() as database:
-            current = _there(database, entry)
+            current = _if_waiting(database, entry)
             if current is None:
                 return None
             _put(database, replace(current, state=REFUSED, problem=problem))
@@ -407,9 +411,9 @@ def _digest(path: Path, parameters: Mapping[str, str] | None) -> str:
     with path.open("rb") as file:
         sha256 = hashlib.file_digest(file, "sha256")
     if parameters is not None:
-        sha256.update(_text(parameters))
+        sha256.update(_sorted_json(parameters))
     return sha256.hexdigest()[:_CONTENT_DIGITS]
 
 
-def _text(parameters: Mapping[str, str]) -> bytes:
+def _sorted_json(parameters: Mapping[str, str]) -> bytes:
     return json.dumps(dict(parameters), sort_keys=True).encode()

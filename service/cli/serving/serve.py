@@ -191,6 +191,7 @@ def page(host: str, port: int, root: str) -> str:
 
 
 def _addresses(host: str, port: int) -> list[tuple[int, int, int, str, tuple[str, ...]]]:
+    """The socket addresses of a host's name, without duplicates. Raises OSError."""
     try:
         addresses: list[tuple[int, int, int, str, tuple[str, ...]]] = socket.getaddrinfo(  # type: ignore[assignment]
             host or None, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE

@@ -22,6 +22,7 @@ def as_html(answer: Mapping[str, Any]) -> str:
 
 
 def _text(value: Any) -> str:
+    """A value of an answer in a few words, for a table cell."""
     if value is None:
         return "–"
     if isinstance(value, bool):

@@ -70,6 +70,7 @@ def _chosen(frames: Frames) -> str:
 
 
 def _cells(item: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """The fields of an item as columns; nested fields have dotted names, notices show their codes."""
     for name, value in item.items():
         if isinstance(value, Mapping) and value:
             yield from _cells(value, f"{prefix}{name}.")

@@ -125,6 +125,8 @@ class Service:
         wanted: Callable[[], bool] = lambda: True,
         **request: Any,
     ) -> Answer:
+        """The answer to a request, which is repeated while the service is away or busy, as long as patience lasts.
+        Raises RefusedError, ServiceAwayError, and NoLongerWantedError once `wanted` is false."""
         import httpx2  # start-up time
 
         deadline, wait, unsure = time.monotonic() + self.patience, FIRST_WAIT, False

@@ -116,11 +116,13 @@ def head_of(run: IncomingRun, origin: float) -> TestHead:
 
 
 def _when(run: IncomingRun, origin: float) -> Moment:
+    """The cycles of a run in its life, and its moment if it is dated."""
     moment = None if run.started_at is None else datetime.fromisoformat(run.started_at).timestamp()
     return {"cycles": run.cycles - origin, "moment": moment}
 
 
 def _stationary(run: IncomingRun, origin: float, torque_filter: float, keep_record: bool) -> StationaryRun:
+    """A stationary run in SI units; the plateaus of a sampled record are cut first."""
     if "time_s" not in run.channels:
         return StationaryRun(**head_of(run, origin), plateaus=stationary_plateaus(run.channels))
     record = sampled_record(run.channels)

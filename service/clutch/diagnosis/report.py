@@ -37,6 +37,7 @@ def finite(value: float) -> float | None:
 
 
 def _misfit(misfit: Misfit | None) -> shapes.MisfitOut:
+    """The error of the model as the report shows it."""
     if misfit is None:
         return shapes.MisfitOut(rmse_nm=None, noise_nm=None, unexplained_share=None, where=[])
     return _shaped(
@@ -49,6 +50,7 @@ def _misfit(misfit: Misfit | None) -> shapes.MisfitOut:
 
 
 def _gain(gain: Gain | None, before: LifePrediction | None, after: LifePrediction | None) -> shapes.GainOut:
+    """The gain of the extended model on held-out runs, with the remaining life before and after."""
     numbers = [name for name in shapes.GainOut.model_fields if name not in {"held_out_runs", "remaining_useful_life"}]
     attributes = {name: _GAIN.get(name, name.removesuffix("_nm")) for name in numbers}
     return shapes.GainOut(
@@ -132,6 +134,7 @@ def public(
 
 
 def _isolability(isolability: Isolability) -> shapes.IsolabilityOut:
+    """Which causes the tests could tell apart, as the report shows it."""
     pairs = [
         _shaped(
             shapes.PairOut,
@@ -183,6 +186,7 @@ def _remaining(report: Report, before: LifePrediction | None, after: LifePredict
 
 
 def _step(step: Step, origin: float) -> shapes.PlanStep:
+    """A step of the test plan in public units."""
     return _shaped(
         shapes.PlanStep,
         step,
@@ -197,6 +201,7 @@ def _step(step: Step, origin: float) -> shapes.PlanStep:
 
 
 def _friction_law(law: FrictionLaw) -> shapes.FrictionLawOut:
+    """The friction law's difference from eq. 3 as the report shows it."""
     gain = law.gain
     effect = law.effect_on_remaining_cycles_percent
     return _shaped(
@@ -225,6 +230,7 @@ def _friction_law(law: FrictionLaw) -> shapes.FrictionLawOut:
 
 
 def _law_curve(curve: LawCurve, origin: float) -> shapes.LawCurveOut:
+    """A friction curve as measured, by eq. 3 and by the law, in public units."""
     return shapes.LawCurveOut(
         pressure_bar=curve.pressure / PASCALS_PER_BAR,
         cycles=curve.cycles + origin,
@@ -237,6 +243,7 @@ def _law_curve(curve: LawCurve, origin: float) -> shapes.LawCurveOut:
 
 
 def _maps(maps: Maps, origin: float) -> shapes.MapsOut:
+    """The residual maps in public units."""
     return shapes.MapsOut(
         axes=shapes.Axes(
             pressure_bar=[bar(pressure) for pressure in maps.pressure.tolist()],
@@ -255,6 +262,7 @@ def _maps(maps: Maps, origin: float) -> shapes.MapsOut:
 
 
 def _loop(loop: LoopTrace, origin: float) -> shapes.LoopTraceOut:
+    """A friction loop as measured and by both models, in public units."""
     return shapes.LoopTraceOut(
         pressure_bar=loop.pressure / PASCALS_PER_BAR,
         cycles=loop.cycles + origin,

@@ -109,6 +109,7 @@ def common_doubts(cause: CommonCause, events: Sequence[Event]) -> dict[str, tupl
 
 
 def _cycles_notice(verdict: SlipVerdict, sent: RunReading) -> Notice:
+    """The doubt about a run's cycles, with the likely value if one is known."""
     sentences = [_gap(verdict, sent.cycles)]
     if verdict.against_time:
         sentences.append("Its date (started_at) does not fit the order of the cycles.")
@@ -124,6 +125,7 @@ def _cycles_notice(verdict: SlipVerdict, sent: RunReading) -> Notice:
 
 
 def _gap(verdict: SlipVerdict, cycles: float) -> str:
+    """The sentence that compares a run's cycles with those of the runs around it."""
     if verdict.latest is None:
         return f"{_number(cycles)} cycles are more than any clutch lasts."
     if verdict.before is None or cycles <= verdict.latest + 0.5:
@@ -136,6 +138,7 @@ def _gap(verdict: SlipVerdict, cycles: float) -> str:
 
 
 def _unit_notice(verdict: SlipVerdict, shown: Shown) -> Notice:
+    """The doubt about a channel that was probably sent in another unit."""
     slip = verdict.slip
     if slip.name == "oil":
         oil = (shown.oil or 0.0) - ZERO_CELSIUS
@@ -165,12 +168,14 @@ def _expected_then(verdict: SlipVerdict) -> bool:
 
 
 def _expected(verdict: SlipVerdict) -> str:
+    """The clause with the expected interval; empty if there is none."""
     if verdict.expected is None:
         return ""
     return f", where {verdict.expected[0]:.3g} to {verdict.expected[1]:.3g} is expected"
 
 
 def _cof_notice(verdict: SlipVerdict, sent: RunReading) -> Notice:
+    """The doubt about a mean COF that is off the course or beyond physics."""
     cof = math.exp(sent.log_cof or -20.0)
     beyond = abs(math.log(cof / criteria.COF)) / criteria.LOG_COF_SD > 2.5
     cause = "Is a sensor or a unit wrong?" if beyond else "Is it another clutch's test?"

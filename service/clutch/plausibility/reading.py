@@ -324,6 +324,7 @@ def _in_unit(shown: Shown, channel: str, factor: float) -> Shown:
 def _scaled(
     values: Mapping[float, tuple[float, float]], channel: str, factor: float
 ) -> dict[float, tuple[float, float]]:
+    """Mean COF and deviation by pressure, as they would be if a channel had another unit."""
     level, cof = (factor, factor) if channel == "pressure" else (1.0, 1.0 / factor)
     return {pressure / level: (value * cof, sd * cof) for pressure, (value, sd) in values.items()}
 
@@ -372,6 +373,7 @@ _OIL = _Usual(OIL, OIL_SD, OTHER_OIL)
 
 
 def _log_normal(value: float, mean: float, deviation: float) -> float:
+    """Log density of a normal distribution."""
     return -0.5 * ((value - mean) / deviation) ** 2 - math.log(deviation * math.sqrt(2 * math.pi))
 
 
@@ -384,6 +386,7 @@ def dead_channels(kind: str, columns: Columns, geometry: Geometry) -> list[Notic
 
 
 def _oddities(kind: str, columns: Columns, geometry: Geometry) -> Iterator[str]:
+    """Sentences on readings that no working sensor gives."""
     yield from _oil(columns.oil_temperature)
     if columns.torque.size < FEWEST_ROWS:
         return
@@ -464,6 +467,7 @@ def _exponent(rows: Columns) -> tuple[float, float]:
 
 
 def _speed_stands(speed: FloatArray) -> Iterator[str]:
+    """The sentence on a speed that does not move in a dynamic test."""
     fastest = float(np.abs(speed).max())
     if not (fastest > 1.0 and _spread(speed) > SPEED_STILL * fastest):
         rpm = float(np.median(speed)) / RADIANS_PER_SECOND_PER_RPM
@@ -471,6 +475,7 @@ def _speed_stands(speed: FloatArray) -> Iterator[str]:
 
 
 def _oil(temperature: FloatArray | None) -> Iterator[str]:
+    """The sentence on an impossible oil temperature."""
     if temperature is None:
         return
     median = float(np.median(temperature))
@@ -481,5 +486,6 @@ def _oil(temperature: FloatArray | None) -> Iterator[str]:
 
 
 def _spread(values: FloatArray) -> float:
+    """The width of the middle 90 % of values."""
     low, high = np.quantile(values, [0.05, 0.95]).tolist()
     return float(high - low)

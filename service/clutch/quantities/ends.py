@@ -183,11 +183,13 @@ def criteria_answer(
 
 
 def _probability_of_reaching(sample: Sample) -> float:
+    """The weight of draws whose limit is ever reached."""
     ends, weight = sample
     return float(min(1.0, weight[np.isfinite(ends)].sum()))
 
 
 def _health(end: CriterionEnd) -> float | None:
+    """The remaining share of the way to a criterion's limit; None if it is not known."""
     limit = _limit(end)
     if end.current is None or end.initial is None or limit is None:
         return None
@@ -227,6 +229,7 @@ def _place(end: CriterionEnd) -> Mapping[str, Any]:
 
 
 def _limit(end: CriterionEnd) -> float | None:
+    """The value at which a criterion ends the life; None for a share of an unknown initial value."""
     criterion = end.criterion
     if criterion.fraction is not None and end.initial is None:
         return None

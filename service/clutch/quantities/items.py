@@ -78,6 +78,7 @@ def paths_item(
 
 
 def _item(quantity: Quantity, series: Series, of_eq_6: _OfEq6, cycles: FloatArray, band: FloatArray) -> DegradationItem:
+    """A tracked quantity as an answer shows it: its measurements, its band, and eq. 6's coefficients."""
     tested = series.scale.cycles(np.array([measurement.progress for measurement in series.measurements]))
     off = series.assumptions.offset(series.quantity, series.pressure, tested)
     measured = zip(series.measurements, off.tolist(), strict=True)

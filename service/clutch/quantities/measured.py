@@ -295,17 +295,20 @@ class MeasuredLife:
         return {level: self.life.at(self.assumptions, level) for level in self.life.reference}
 
     def _engagement_series(self, quantity: Quantity) -> Series:
+        """The series of an indicator over the engagements of the life."""
         estimates = {row.run_id: getattr(row.indicators, quantity.internal) for row in self.engagements}
         values = [estimates.get(event.run_id) for event in self.life.events]
         at_events = [None if value is None else (value.value, value.sd) for value in values]
         return self.life.series(self.assumptions, quantity.internal, ALL_PRESSURES, at_events)
 
     def _slopes(self, level: float, speed_rpm: float) -> Series:
+        """The series of dμ/dv at a pressure level and speed over the tests of the life."""
         values = [self._slope(levels, level, speed_rpm) for levels in self.tests]
         series = self.life.series(self.assumptions, f"{SLOPE}@{speed_rpm:g}rpm", level, values)
         return replace(series, speed_rpm=speed_rpm)
 
     def _slope(self, levels: Sequence[LevelFit], level: float, speed_rpm: float) -> Value | None:
+        """dμ/dv of one test at the curve nearest to a pressure level; None if none is near."""
         curves = {curve.fit.pressure: curve for curve in curves_of(levels)}
         near = nearest_pressure(level, list(curves))
         return None if near is None else slope_of(curves[near], self.geometry, speed_rpm)

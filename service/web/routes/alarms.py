@@ -183,6 +183,7 @@ async def test_webhook(context: auth.Admin, webhook_id: WebhookId) -> Response:
 
 
 async def _saved(request: Request, context: Context, alarm_id: str | None) -> Response:
+    """Store a rule and answer with it: 201 if it is new."""
     rule = await sent(request, api.AlarmIn)
     auth.require_clutch(auth.grant_of(request), rule.clutch_id)
     by, save = auth.grant_of(request).name, change_alarms.save
@@ -192,6 +193,7 @@ async def _saved(request: Request, context: Context, alarm_id: str | None) -> Re
 
 
 async def _tested(context: Context, names: list[str]) -> Response:
+    """The outcome of test messages, once all are sent or time is up."""
     context.outbox.wake()
     items = await until_ended(
         partial(alarms.delivered, context.database, names),

@@ -15,7 +15,7 @@ from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import Response
 
 from service.answers import rigs, runs
-from service.answers.raw_run import Kind, copy_file, entity_tag, file_sha256, write_run
+from service.answers.raw_run import RawFormat, copy_file, entity_tag, file_sha256, write_run
 from service.api import parameters
 from service.api.base import Origin
 from service.api.run import (
@@ -216,7 +216,7 @@ async def read_run_with_channels(
 ) -> Response:
     """One receipt with the run's channels: as sent, or thinned for a plot, or as Parquet if `Accept` prefers it."""
     media_type = files.preferred(request, (responses.JSON_TYPE, files.PARQUET_TYPE))
-    kind: Kind = "parquet" if media_type == files.PARQUET_TYPE else "json"
+    kind: RawFormat = "parquet" if media_type == files.PARQUET_TYPE else "json"
     packed = kind == "json" and points is not None and "gzip" in request.headers.get("accept-encoding", "")
     headers = {"Cache-Control": "no-cache", "Vary": "Accept, Accept-Encoding"}
     headers |= {"Content-Encoding": "gzip"} if packed else {}
