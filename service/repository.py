@@ -34,7 +34,7 @@ from service.channels import content_of, instant, whole
 from service.clutch import items
 from service.clutch.analysis import LevelFit, analyse
 from service.clutch.assumptions import ALL_PRESSURES, FLEET, LearnedPrior, kind_of, severity_name, severity_under
-from service.clutch.condition import DISAGREES, rank_of, state_of, top_line
+from service.clutch.condition import DISAGREES, as_stored, rank_of, state_of, top_line
 from service.clutch.engagements import DUTY_KINDS, StoredEngagement, stored_engagement
 from service.clutch.incoming_run import IncomingRun, content_hash
 from service.clutch.items import doubted
@@ -157,7 +157,7 @@ def state(
         priors={severity: _learned_prior(connection, own, severity, tracked) for severity in severities},
         filters=_filters(connection, row) if carried else None,
         held=past.held,
-        summary={} if damaged else row.summary,
+        summary=as_stored({} if damaged else row.summary),
     )
 
 
@@ -473,13 +473,14 @@ def latest_diagnosis(row: ClutchRow, verdict: VerdictRow | None) -> LatestDiagno
 
 
 def condition(row: ClutchRow) -> dict[str, str]:
-    return state_of(row.summary, disputed=row.is_disputed, silent=row.silent)
+    return state_of(as_stored(row.summary), disputed=row.is_disputed, silent=row.silent)
 
 
 def first_line(row: ClutchRow, diagnosis: LatestDiagnosis | None, *, raised: int) -> dict[str, str]:
     """The clutch's `headline` and `action`. `diagnosis`: its newest one as sent to clients; `raised`: its number of
     unacknowledged alarms."""
-    return top_line(row.summary, disputed=row.is_disputed, diagnosis=diagnosis, silent=row.silent, raised=raised)
+    summary = as_stored(row.summary)
+    return top_line(summary, disputed=row.is_disputed, diagnosis=diagnosis, silent=row.silent, raised=raised)
 
 
 def note_dispute(connection: Connection, clutch_id: str) -> None:

@@ -18,7 +18,7 @@ from service.alarms.rules import ClutchFacts, Finding, Silence
 from service.api.alarm import AlarmIn, EventOut
 from service.api.base import of_row
 from service.api.clutch import ClutchIn
-from service.clutch.condition import state_of
+from service.clutch.condition import as_stored, state_of
 from storage import alarms, clutches, webhooks
 from storage.alarms import AlarmRow, EventRow
 from storage.clutches import ClutchRow
@@ -200,7 +200,7 @@ def _with_silence(facts: ClutchFacts, kept: set[str]) -> ClutchRow:
     row, silent = facts.clutch, facts.heard() if kept else None
     if silent is None and row.silent is None:
         return row
-    state = state_of(row.summary, disputed=row.is_disputed, silent=silent)["name"]
+    state = state_of(as_stored(row.summary), disputed=row.is_disputed, silent=silent)["name"]
     clutches.set_silent(facts.connection, row.clutch_id, silent, state=state)
     return replace(row, silent=silent, state=state)
 

@@ -1,9 +1,8 @@
 """What a rule watches: one value of a clutch against a limit, or a state or verdict among some."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from scipy.special import ndtri
@@ -19,6 +18,7 @@ from service.clutch.assumptions import ALL_PRESSURES
 from service.clutch.items import ENDED, INSUFFICIENT
 from service.clutch.notices import OFF_TRACK
 from service.clutch.plausibility.doubts import OFF_COURSE
+from service.clutch.summary import StoredSummary
 from service.clutch.timeline import STATIONARY
 from storage import alarms, diagnoses, results, runs
 from storage.clutches import ClutchRow
@@ -55,8 +55,9 @@ class ClutchFacts:
         return self.clutch.clutch_id
 
     @property
-    def summary(self) -> Mapping[str, Any]:
-        return self.clutch.summary
+    def summary(self) -> StoredSummary:
+        """The summary of the clutch's condition."""
+        return condition.as_stored(self.clutch.summary)
 
     def heard(self) -> str | None:
         """When the clutch's last run arrived."""
@@ -163,7 +164,8 @@ def _remaining_days(rule: AlarmIn, facts: ClutchFacts) -> Finding | None:
 
 
 def _health(_rule: AlarmIn, facts: ClutchFacts) -> Finding | None:
-    health = (facts.summary.get("current") or {}).get("health")
+    current = facts.summary.get("current")
+    health = None if current is None else current["health"]
     if health is None or facts.summary.get("status") == ENDED:
         return None
     return Finding(value=float(health), words=f"health {health:.0%}")

@@ -14,7 +14,7 @@ from service.api.alarm import EventOut
 from service.api.base import of_row
 from service.api.clutch import ClutchOut, LatestDiagnosis
 from service.api.fleet import FleetTotals, StateCounts
-from service.clutch.condition import NORMAL, RANK_ENDED, STATES, stated
+from service.clutch.condition import NORMAL, RANK_ENDED, STATES, as_stored, stated
 from service.paging import Part, by_name, page_as_bytes
 from storage import alarms, clutches, diagnoses
 from storage.clutches import ByNeed, ClutchRow, ClutchSelection
@@ -143,7 +143,7 @@ def _item(clutch: _Shown) -> ClutchOut:
         state=repository.condition(row),
         runs=row.summary.get("runs", 0),
         recent=row.summary.get("recent"),
-        summary=stated(row.summary),
+        summary=stated(as_stored(row.summary)),
         held=row.summary.get("held", 0),
         alarms=clutch.alarms,
         diagnosis=diagnosis,

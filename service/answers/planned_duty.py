@@ -28,9 +28,10 @@ from models.prognosis.stated_end import StatedEnd
 from service import repository
 from service.api.life import LifePrediction, PlannedBlock, PlannedLife, ProgrammeIn, Quantiles
 from service.channels import PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM
-from service.clutch.condition import with_held_runs
+from service.clutch.condition import in_short, with_held_runs
 from service.clutch.items import ENDED, INSUFFICIENT, SAFE, by_quantile, ended, warned
 from service.clutch.recomputation import ClutchHistory
+from service.clutch.summary import StoredSummary
 from service.clutch.timeline import Event, Series, date_of, moment_at, pace_of
 from service.clutch.tracking import advance, carrier, drawn, end_of_life, predict, predict_at, sampled, step_rng
 from service.clutch.with_held import with_held
@@ -57,12 +58,12 @@ def planned_life(database: Database, clutch_id: str, method: str, planned: Progr
     among = None
     if state.held:
         evidence = repository.evidence_for(database, state, repository.run_reader(database, clutch_id))
-        among = None if evidence is None else _prediction(with_held(state, evidence), method, planned)[0].model_dump()
-    summary = {}
+        among = None if evidence is None else in_short(_prediction(with_held(state, evidence), method, planned)[0])
+    summary: StoredSummary = {}
     if pace is not None and events:
         a_second = pace / _SECONDS_PER_HOUR
         summary["pace"] = {"cycles_per_second": a_second, "moment": moment_at(events, a_second, events[-1].cycles)}
-    beside = with_held_runs(prediction.model_dump(), summary, among, len(state.held))
+    beside = with_held_runs(in_short(prediction), summary, among, len(state.held))
     head = {"clutch_id": clutch_id, "method": method, "revision": state.revision, "origin": state.record.origin}
     return PlannedLife(
         **{**head, **dict(prediction), **beside.of(prediction), **asdict(plan)},

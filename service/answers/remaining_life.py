@@ -2,10 +2,9 @@
 
 import json
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any
 
 from sqlalchemy import Connection
 
@@ -13,7 +12,7 @@ from service import repository
 from service.api.clutch import EndOfLifeIn
 from service.api.life import CriterionIn, CriterionOutcome, CriterionValue, LifePrediction, RemainingLife
 from service.clutch.assumptions import ALL_PRESSURES, MEAN_COF
-from service.clutch.condition import with_held_runs
+from service.clutch.condition import as_stored, in_short, with_held_runs
 from service.clutch.items import ended, warned
 from service.clutch.notices import filters_disagree
 from service.clutch.quantities.ends import GIVEN, criteria_answer, criterion_end
@@ -26,6 +25,7 @@ from service.clutch.quantities.measured import (
     quantity_named,
 )
 from service.clutch.recomputation import ClutchHistory
+from service.clutch.summary import Outlook, StoredSummary
 from service.clutch.tracking import CARRIED, PREDICTED, predict_at
 from service.clutch.with_held import ClutchMeasurements, measured_life, with_held
 from service.errors import NotFoundError, unknown_clutch
@@ -65,7 +65,9 @@ def remaining_life(
         now = at_cycles is None or at_cycles >= row.summary.get("as_of_cycles", math.inf)
         earlier = not now and bool(row.summary.get("held"))
         state = repository.state(connection, clutch_id, carried=carried_on) if stored is None or earlier else None
-    summary, count = row.summary if now else {}, row.summary.get("held", 0)
+    stored_summary = as_stored(row.summary)
+    summary: StoredSummary = stored_summary if now else {}
+    count = stored_summary.get("held", 0)
     outlook_with_held = (summary.get("with_held") or {}).get(method)
     if state is not None:
         count = len(chosen_life(state, at_cycles=None if now else at_cycles).held)
@@ -80,7 +82,7 @@ def remaining_life(
         prediction = _predicted(state, method, pressure_bar, at_cycles)
     disagree = filters_disagree({**carried, method: prediction}) if carried else []
     prediction = prediction.model_copy(update={"warnings": [*prediction.warnings, *warned(disagree)]})
-    beside = with_held_runs(prediction.model_dump(), summary, outlook_with_held, count)
+    beside = with_held_runs(in_short(prediction), summary, outlook_with_held, count)
     head = {"clutch_id": clutch_id, "method": method, "revision": row.revision, "origin": row.record["origin"]}
     return RemainingLife(**{**head, **dict(prediction), **beside.of(prediction)}, criteria=_criteria(prediction))
 
@@ -111,12 +113,12 @@ def _predicted(
 
 def _with_held(
     database: Database, state: ClutchHistory, method: str, pressure_bar: float | None, at_cycles: float | None
-) -> Mapping[str, Any]:
+) -> Outlook:
     """The prediction that also counts the held runs."""
     evidence = repository.evidence_for(database, state, repository.run_reader(database, state.clutch_id))
     if evidence is None:
         raise AssertionError("runs are held: the evidence was loaded")
-    return _predicted(with_held(state, evidence), method, pressure_bar, at_cycles).model_dump()
+    return in_short(_predicted(with_held(state, evidence), method, pressure_bar, at_cycles))
 
 
 def _criteria(prediction: LifePrediction) -> list[CriterionOutcome]:
@@ -195,8 +197,8 @@ def life_by_criteria(
         evidence = replace(evidence, reader=repository.run_reader(database, clutch_id))
         state_with_held = with_held(state, evidence)
         chosen_with_held = chosen_life(state_with_held, life, None if now else at_cycles)
-        among = by_criteria(state_with_held, chosen_with_held, evidence)[0].model_dump()
-    beside = with_held_runs(prediction.model_dump(), row.summary if now else {}, among, len(chosen.held))
+        among = in_short(by_criteria(state_with_held, chosen_with_held, evidence)[0])
+    beside = with_held_runs(in_short(prediction), as_stored(row.summary if now else {}), among, len(chosen.held))
     head = {"clutch_id": clutch_id, "method": method, "revision": row.revision, "origin": state.record.origin}
     return RemainingLife(**{**head, **dict(prediction), **beside.of(prediction)}, life=chosen.item(), criteria=criteria)
 

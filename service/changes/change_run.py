@@ -11,7 +11,6 @@ from dataclasses import dataclass, field, replace
 from datetime import datetime
 from itertools import compress
 from pathlib import Path
-from typing import Any
 
 from sqlalchemy import Connection
 
@@ -33,6 +32,7 @@ from service.clutch.recomputation import (
     reader_with,
     with_set_aside,
 )
+from service.clutch.summary import StoredSummary
 from service.clutch.timeline import (
     STATIONARY,
     Event,
@@ -354,7 +354,7 @@ def _computed(database: Database, loaded: _Loaded, rows: Sequence[RunRow]) -> tu
     if evidence is not None:
         evidence = replace(evidence, levels=loaded.levels, receipts={**receipts, **changed})
     if computed.tracking is None:
-        summary: Mapping[str, Any] = {**before.summary, **held_summary(after, {}, evidence)}
+        summary: StoredSummary = {**before.summary, **held_summary(after, {}, evidence)}
     else:
         summary = summarised(after, computed.tracking, evidence)
     teaches = any(

@@ -8,7 +8,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from typing import Any
+from typing import Any, cast
 
 from models.prognosis.criteria import FEWEST_TESTS, HORIZON
 from models.prognosis.first_passage import PassageStatus
@@ -19,6 +19,7 @@ from service.channels import whole
 from service.clutch.criteria import FEW_CYCLES, LONGEST_TEST, MAX_LINE_POINTS, NEAR_LIMIT, OTHER_OIL, SOON
 from service.clutch.items import ENDED, INSUFFICIENT
 from service.clutch.notices import interval_in_words
+from service.clutch.summary import Outlook, Pace, PredictionInShort, StoredSummary
 from service.clutch.timeline import WORN, Event, Series, date_of
 
 _SECONDS_PER_DAY = 86_400.0
@@ -53,7 +54,17 @@ HELD_RUNS = "held_runs"
 RANK_UNKNOWN, RANK_ENDED = 2 * HORIZON, 3 * HORIZON
 
 
-def rank_of(summary: Mapping[str, Any]) -> float:
+def as_stored(content: Mapping[str, Any]) -> StoredSummary:
+    """The summary in a clutch's row."""
+    return cast("StoredSummary", content)
+
+
+def in_short(prediction: LifePrediction) -> PredictionInShort:
+    """A prediction in the form of the summary."""
+    return cast("PredictionInShort", prediction.model_dump())
+
+
+def rank_of(summary: StoredSummary) -> float:
     """The clutch's sort key among those in its state: the safe bound on remaining cycles, with held runs considered."""
     if summary.get("ended") is not None:
         return RANK_ENDED
@@ -82,7 +93,7 @@ class BesidePrediction:
 
 
 def with_held_runs(
-    payload: Mapping[str, Any], summary: Mapping[str, Any], among: Mapping[str, Any] | None, count: int
+    payload: PredictionInShort, summary: StoredSummary, among: Outlook | None, count: int
 ) -> BesidePrediction:
     """The fields beside a prediction. `among` is the prediction with the `count` held runs counted (None: none is
     held); the safe bound is the lower of both, with its date at the pace of the runs. `summary` is the clutch's, empty
@@ -105,7 +116,7 @@ def with_held_runs(
     )
 
 
-def pace_in_words(pace: Mapping[str, float] | None, cycles: float | None) -> str | None:
+def pace_in_words(pace: Pace | None, cycles: float | None) -> str | None:
     """Cycles converted to days at the pace of the runs, and the day from which they count; None if either is unknown.
     Answers do not depend on today's date, which may be long after the last run."""
     since = None if pace is None or cycles is None else date_of(pace["moment"])
@@ -117,39 +128,39 @@ def pace_in_words(pace: Mapping[str, float] | None, cycles: float | None) -> str
     return f"{shown} at the pace so far, counted from the last run on {day.day} {day:%b %Y}"
 
 
-def stated(summary: Mapping[str, Any]) -> ClutchSummary | None:
+def stated(summary: StoredSummary) -> ClutchSummary | None:
     """A clutch's summary as lists show it; None before the first accepted run."""
     if "status" not in summary:
         return None
     beside = with_held_runs(summary, summary, _with_held(summary), summary.get("held", 0))
-    own = {name: summary[name] for name in SUMMARY} | {name: getattr(beside, name) for name in BESIDE}
-    return ClutchSummary(**own)
+    own = {name: value for name, value in summary.items() if name in SUMMARY}
+    return ClutchSummary.model_validate(own | {name: getattr(beside, name) for name in BESIDE})
 
 
-def lower_bound(at_least: float | None, among: Mapping[str, Any] | None) -> float | None:
+def lower_bound(at_least: float | None, among: Outlook | None) -> float | None:
     """The lower of two safe bounds, without and with the held runs; None if neither is known."""
     bounds = [at_least, None if among is None else among["at_least"]]
     return min((bound for bound in bounds if bound is not None), default=None)
 
 
-def _with_held(summary: Mapping[str, Any]) -> Mapping[str, Any] | None:
+def _with_held(summary: StoredSummary) -> Outlook | None:
     """The shown prediction with the held runs counted; None if no run is held."""
     return (summary.get("with_held") or {}).get(SHOWN)
 
 
-def bound_of(summary: Mapping[str, Any]) -> float | None:
+def bound_of(summary: StoredSummary) -> float | None:
     """The safe bound of a summary, with held runs considered; None if it is unknown."""
     return lower_bound(summary["at_least"], _with_held(summary))
 
 
-def median_of(summary: Mapping[str, Any]) -> float:
+def median_of(summary: StoredSummary) -> float:
     """The median of remaining cycles, at most the horizon; if runs are held, the lower of the medians without and with
     them."""
     medians = [each["remaining_cycles"]["0.5"] for each in (summary, _with_held(summary)) if each is not None]
     return min((float(median) for median in medians if median is not None), default=HORIZON)
 
 
-def _warning_about_held_runs(payload: Mapping[str, Any], among: Mapping[str, Any], count: int) -> Warned:
+def _warning_about_held_runs(payload: PredictionInShort, among: Outlook, count: int) -> Warned:
     """The warning about held runs, with their effect on the prediction; the safe bounds may differ even if both
     remaining lives are unknown."""
     if all(among[name] == payload[name] for name in ("status", "remaining_cycles", "at_least")):
@@ -179,7 +190,7 @@ def held_in_words(count: int) -> str:
     return "1 run is held and does not count" if count == 1 else f"{count} runs are held and do not count"
 
 
-def state_of(summary: Mapping[str, Any], *, disputed: bool, silent: str | None = None) -> dict[str, str]:
+def state_of(summary: StoredSummary, *, disputed: bool, silent: str | None = None) -> dict[str, str]:
     """A clutch's state by NAMUR NE 107 with the reason, from its summary; `disputed`: its newest diagnosis found that
     data and model disagree, and nobody has acted on it; `silent`: the time of the last message, if the rig's silence is
     an alarm."""
@@ -189,7 +200,7 @@ def state_of(summary: Mapping[str, Any], *, disputed: bool, silent: str | None =
     return {"name": name, "why": statement_of(summary, bound_of(summary))}
 
 
-def _state_and_reason(summary: Mapping[str, Any], *, disputed: bool, silent: str | None) -> tuple[str, str]:
+def _state_and_reason(summary: StoredSummary, *, disputed: bool, silent: str | None) -> tuple[str, str]:
     """The first state with a true condition, and its reason as a clause; the reason is empty if the statement of the
     remaining life serves as one."""
     held = summary.get("held", 0)
@@ -198,7 +209,7 @@ def _state_and_reason(summary: Mapping[str, Any], *, disputed: bool, silent: str
     if "status" not in summary:
         return CHECK, held_in_words(held) if held else "no run counts yet"
     status = summary["status"]
-    worn = status == ENDED and summary["ended"]["reason"] == WORN
+    worn = status == ENDED and (end := summary["ended"]) is not None and end["reason"] == WORN
     near = None if status in (REACHED, INSUFFICIENT, ENDED) else _near_end(summary)
     rules = (
         (FAILURE, "" if status == REACHED or worn else None),
@@ -218,7 +229,7 @@ def silence_in_words(since: str) -> str:
 
 
 def top_line(
-    summary: Mapping[str, Any],
+    summary: StoredSummary,
     *,
     disputed: bool,
     diagnosis: LatestDiagnosis | None = None,
@@ -242,7 +253,7 @@ def top_line(
     }
 
 
-def _numbers_in_words(summary: Mapping[str, Any], at_least: float | None, paced: str | None) -> str:
+def _numbers_in_words(summary: StoredSummary, at_least: float | None, paced: str | None) -> str:
     """The safe bound (both, if held runs lower it), its days and the median; the statement of the remaining life if
     there is no number."""
     own = summary["at_least"]
@@ -256,12 +267,13 @@ def _numbers_in_words(summary: Mapping[str, Any], at_least: float | None, paced:
     bound = bound_in_words(at_least) + ("" if paced is None else f": {paced}")
     if summary["status"] == PassageStatus.MAY_NEVER_REACH.value:
         return _left_open(bound, summary)
-    median = summary["remaining_cycles"]["0.5"]
+    if (median := summary["remaining_cycles"]["0.5"]) is None:
+        return bound
     unit = _second_digit(max(1.0, median))
     return f"{bound}; 50 % chance of {round(median / unit) * unit:,.0f} or more"
 
 
-def _action(name: str, summary: Mapping[str, Any], soon: str, diagnosis: LatestDiagnosis | None, raised: int) -> str:
+def _action(name: str, summary: StoredSummary, soon: str, diagnosis: LatestDiagnosis | None, raised: int) -> str:
     """The recommended action for a state, in one sentence; `soon`: how soon. Alarms ask for attention even if the state
     does not."""
     held = summary.get("held", 0)
@@ -328,7 +340,7 @@ def _cause_in_words(slug: str) -> str:
     return "a cause outside the catalogue" if slug == "uncatalogued" else slug.replace("_", " ")
 
 
-def _tests(summary: Mapping[str, Any]) -> str:
+def _tests(summary: StoredSummary) -> str:
     """The number of present tests out of those needed for a prediction, as a clause."""
     places, left_out = _distinct_test_cycles(summary), _tests_unlike_first(summary)
     known = f"{places} of the {FEWEST_TESTS} tests that a prediction needs"
@@ -337,21 +349,21 @@ def _tests(summary: Mapping[str, Any]) -> str:
     return f"{known} ({left_out} more cannot be compared with the first)" if left_out else known
 
 
-def _distinct_test_cycles(summary: Mapping[str, Any]) -> int:
+def _distinct_test_cycles(summary: StoredSummary) -> int:
     """The number of different cycles with counted tests; for an older summary without it, the number of counted tests."""
     return int(summary.get("places", summary.get("runs_used", 0)))
 
 
-def _tests_unlike_first(summary: Mapping[str, Any]) -> int:
+def _tests_unlike_first(summary: StoredSummary) -> int:
     """The number of tests that cannot be compared with the first."""
     return int(summary.get("tests", 0) - summary.get("runs_used", 0)) if "tests" in summary else 0
 
 
-def _near_end(summary: Mapping[str, Any]) -> str | None:
+def _near_end(summary: StoredSummary) -> str | None:
     """The reason why a predicted end is near, by the share of life left at the safe bound or by a quantity's limit;
     None if it is not near."""
-    age = summary["as_of_cycles"] - summary["from_cycles"]
-    if summary["at_least"] < SOON * (age + summary["at_least"]):
+    as_of, left = summary["as_of_cycles"], summary["at_least"]
+    if as_of is not None and left is not None and left < SOON * (as_of - summary["from_cycles"] + left):
         return f"less than {100 * SOON:.0f} % of its life may be left"
     health = summary["current"]["health"]
     if health is not None and health < NEAR_LIMIT:
@@ -359,7 +371,7 @@ def _near_end(summary: Mapping[str, Any]) -> str | None:
     return None
 
 
-def statement_of(payload: Mapping[str, Any], at_least: float | None) -> str:
+def statement_of(payload: PredictionInShort, at_least: float | None) -> str:
     """A sentence on the remaining life: its safe bound, which held runs may lower, and the probability of an end within
     the horizon if that is open."""
     bound, own = bound_in_words(at_least), payload["at_least"]
@@ -377,17 +389,17 @@ def statement_of(payload: Mapping[str, Any], at_least: float | None) -> str:
     return _left_open(bound, payload) if payload["status"] == PassageStatus.MAY_NEVER_REACH.value else bound
 
 
-def untested_since(payload: Mapping[str, Any]) -> float | None:
+def untested_since(payload: PredictionInShort) -> float | None:
     """The cycles of the last test, if the predicted end of life lies after it, so that no measurement confirms it; else
     None."""
     tested, end = payload["current"]["measured_at_cycles"], payload.get("end_of_life_cycles", {}).get("0.5")
     return tested if tested is not None and end is not None and end > tested else None
 
 
-def _left_open(bound: str, payload: Mapping[str, Any]) -> str:
+def _left_open(bound: str, payload: PredictionInShort) -> str:
     """The statement for an interval that reaches the horizon: the safe bound, and the probability of an end before the
     horizon."""
-    chance = chance_in_words(payload["probability_of_reaching"])
+    chance = chance_in_words(payload["probability_of_reaching"] or 0.0)
     within = f"the end comes within {payload.get('horizon_cycles', HORIZON):,.0f} cycles with a probability of {chance}"
     return f"{bound}; later tests will tell how many more ({within})"
 

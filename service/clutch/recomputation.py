@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from models.clutch import Geometry
 from models.degradation.severity import Severity
@@ -28,6 +28,7 @@ from service.clutch.items import fit_items, loop_items
 from service.clutch.model_correction import RunReader, corrected_cofs, model_in_force
 from service.clutch.notices import OF_HISTORY, OFF_TRACK, warned_again
 from service.clutch.plausibility.doubts import Judged, levelled
+from service.clutch.summary import StoredSummary
 from service.clutch.tracking import CARRIED, States, TrackPrediction, follow
 from service.errors import Notice
 from service.tracing import tracer
@@ -74,7 +75,7 @@ class ClutchHistory:
     archived: bool = False
     filters: States | None = None
     held: tuple[timeline.Event, ...] = ()
-    summary: Mapping[str, Any] = field(default_factory=dict)
+    summary: StoredSummary = field(default_factory=StoredSummary)
 
     @property
     def clutch_id(self) -> str:
@@ -166,7 +167,7 @@ class Results:
     corrected: Mapping[str, timeline.Corrected] = field(default_factory=dict)
     corrected_again: bool = False
     tracking: Tracking | None = None
-    summary: Mapping[str, Any] | None = None
+    summary: StoredSummary | None = None
     judged: Judged = field(default_factory=Judged)
     teaches: Kind | None = None
 

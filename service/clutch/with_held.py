@@ -5,18 +5,18 @@ Computed with the results of every run and change, and stored with them as the c
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 from service.api.life import LifePrediction
 from service.api.over_life import MeasuredEngagement
 from service.api.run import Evaluation
-from service.clutch.condition import SHOWN, STORED, recent
+from service.clutch.condition import SHOWN, STORED, as_stored, recent
 from service.clutch.engagements import StoredEngagement, engagements_over_life
 from service.clutch.items import ended
 from service.clutch.model_correction import RunReader
 from service.clutch.quantities.ends import CriterionEnd, criteria_answer, criterion_end
 from service.clutch.quantities.measured import ChosenLife, MeasuredLife, chosen_life
 from service.clutch.recomputation import ClutchHistory, Levels, Tracking, with_cofs
+from service.clutch.summary import Outlook, StoredSummary
 from service.clutch.timeline import Life, moment_at, order, pace_of
 from service.clutch.tracking import PREDICTED, States, carrier, predict_at
 from service.errors import NotFoundError
@@ -37,7 +37,7 @@ def needs_evidence(state: ClutchHistory) -> bool:
     return bool(state.held or state.record.end_of_life.criteria)
 
 
-def summarised(state: ClutchHistory, tracking: Tracking, evidence: ClutchMeasurements | None) -> Mapping[str, Any]:
+def summarised(state: ClutchHistory, tracking: Tracking, evidence: ClutchMeasurements | None) -> StoredSummary:
     """The summary of a tracked clutch; `evidence` is required if `needs_evidence`."""
     if not state.events:
         return held_summary(state, {}, evidence)
@@ -47,7 +47,8 @@ def summarised(state: ClutchHistory, tracking: Tracking, evidence: ClutchMeasure
         prediction = by_own_criteria(state, SHOWN, prediction, evidence, tracking.filters)
     payload = prediction.model_dump(mode="json", exclude_unset=True)
     pace, pooled = pace_of(life.events), life.pooled(state.assumptions)
-    summary = {name: payload[name] for name in STORED} | {
+    predicted = as_stored({name: payload[name] for name in STORED})
+    present: StoredSummary = {
         "runs": len(state.events),
         "new_levels": [event.run_id for event in state.events if event.new_level],
         "recent": recent(state.events, pooled).model_dump(mode="json"),
@@ -60,10 +61,10 @@ def summarised(state: ClutchHistory, tracking: Tracking, evidence: ClutchMeasure
         "places": len({measurement.progress for measurement in pooled.measurements}),
         "pace": None if pace is None else {"cycles_per_second": pace, "moment": moment_at(life.events, pace, last)},
     }
-    return {**summary, **held_summary(state, tracking.filters, evidence)}
+    return {**predicted, **present, **held_summary(state, tracking.filters, evidence)}
 
 
-def held_summary(state: ClutchHistory, filters: States, evidence: ClutchMeasurements | None) -> Mapping[str, Any]:
+def held_summary(state: ClutchHistory, filters: States, evidence: ClutchMeasurements | None) -> StoredSummary:
     """The held runs in a clutch's summary: their number, and the prediction by each filter with them counted."""
     if not state.held or evidence is None:
         return {"held": len(state.held), "with_held": None}
@@ -82,14 +83,19 @@ def with_held(state: ClutchHistory, evidence: ClutchMeasurements) -> ClutchHisto
     return with_cofs(state_with_held, evidence.levels, evidence.reader)[0]
 
 
-def outlook(state: ClutchHistory, method: str, evidence: ClutchMeasurements, filters: States) -> Mapping[str, Any]:
+def outlook(state: ClutchHistory, method: str, evidence: ClutchMeasurements, filters: States) -> Outlook:
     """The remaining life by a filter and the clutch's own criteria; `filters` are carried on only if they are of the
     same measurements."""
     prediction = predict_at(
         state.lives, state.assumptions, state.fraction, method=method, carried=filters.get(carrier(method))
     )
     prediction = by_own_criteria(state, method, prediction, evidence, filters)
-    return {name: getattr(prediction, name) for name in ("status", "as_of_cycles", "remaining_cycles", "at_least")}
+    return {
+        "status": prediction.status,
+        "as_of_cycles": prediction.as_of_cycles,
+        "remaining_cycles": prediction.remaining_cycles,
+        "at_least": prediction.at_least,
+    }
 
 
 def by_own_criteria(
