@@ -405,7 +405,11 @@ class _Nodes:
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Crossings of the threshold under the nodes that hold 99.9 % of the evidence: log ζ [m], its standard
         deviation [m], and the nodes' shares of the evidence [m]. `pace` [j] is the slope of every course at its end,
-        `wander` [k] the deviation of the logarithm where all of the life is to come."""
+        `wander` [k] the deviation of the logarithm where all of the life is to come.
+
+        Given the tests the damage at a node's end is 1 + `beyond`, with variance `spread`. Along the slope p it is 1 at the
+        share 1 - beyond/p of that end: log ζ = log end + ln(1 - beyond/p).
+        """
         share = np.exp(self.log_evidence - self.log_evidence.max()).ravel()
         order = np.argsort(share)[::-1]
         within = np.cumsum(share[order])

@@ -48,17 +48,16 @@ class Suggested:
 def suggested(filename: str, beside: Sequence[str], cells: Mapping[str, str]) -> Suggested:
     """Suggestions from a file's name, the names `beside` it, and the cells above its table."""
     name = PurePath(filename).name
-    clutch_cell = label_of("clutch", cells)
+    clutch_cell, cycles_cell = label_of("clutch", cells), label_of("cycles", cells)
     clutch_id = cells[clutch_cell] if clutch_cell and _IDENTIFIER.fullmatch(cells[clutch_cell]) else None
-    clutch_cell = clutch_cell if clutch_id else None
-    cycles_cell = label_of("cycles", cells)
     cycles = count(cells[cycles_cell]) if cycles_cell else None
+    clutch_cell = None if clutch_id is None else clutch_cell
     cycles_cell = None if cycles is None else cycles_cell
-    by_name = cycles_of_all(name, beside) if cycles is None else None
-    clutch_id = clutch_id or _clutch(name, by_name if cycles is None else cycles)
-    if cycles is None and by_name is None and clutch_id is not None:
-        by_name = _only_number(_stem(name).replace(clutch_id, ""))
-    cycles = by_name if cycles is None else cycles
+    if cycles is None:
+        cycles = cycles_of_all(name, beside)
+    clutch_id = clutch_id or _clutch(name, cycles)
+    if cycles is None and clutch_id is not None:
+        cycles = _only_number(_stem(name).replace(clutch_id, ""))
     pattern = pattern_for(name, cycles, None if clutch_cell else clutch_id)
     named = Named(kind=kind_in(name), cycles=cycles, clutch_id=clutch_id)
     return Suggested(named=named, file_name=pattern, cycles_cell=cycles_cell, clutch_cell=clutch_cell)
