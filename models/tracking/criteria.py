@@ -77,8 +77,8 @@ DEPTH = 9.0
 MOST = 6
 #: Deviations from the prior mean that an unscented filter's state may reach. Chosen; no table.
 DOMAIN = 6.0
-#: An innovation counts at most as one of this many deviations in an unscented filter. Chosen; no table.
-OUTLIER = 5.0
+#: A form of less probability before a test has no normal there. Chosen: docs/appendix/prognosis.md (beside the exact posterior).
+LEAST_FORM = 0.007
 
 # Older tests of a long history (`merged_tests`)
 

@@ -61,12 +61,12 @@ _BEGUN = np.concatenate(
 )
 
 
-def value_and_slope_now() -> FloatArray:
-    """δ(T), row 0, and T δ'(T), row 1, for curvature of one standard deviation on each stretch of the past alone;
-    [2, PAST]."""
-    gain = _GAIN[:PAST]
-    from_middle = 1.0 - _EDGES[:PAST] - 0.5 * _LENGTHS[:PAST]
-    return np.asarray(np.stack([gain * _LENGTHS[:PAST] * from_middle, gain * _LENGTHS[:PAST]]))
+def value_and_slope(progress: float, span: float) -> FloatArray:
+    """δ(ζ), row 0, and ζ δ'(ζ), row 1, at progress ζ up to T, for curvature of one standard deviation on each stretch of the
+    past alone; [2, PAST]."""
+    u = progress / span
+    slope = u * _GAIN[:PAST] * np.clip(u - _EDGES[:PAST], 0.0, _LENGTHS[:PAST])
+    return np.stack([smooth(np.asarray(progress), span, PAST), slope])
 
 
 def columns(history: History) -> FloatArray:

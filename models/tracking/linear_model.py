@@ -118,6 +118,38 @@ def drawn_pair(sums: Sums, prior: TrackPrior, normals: FloatArray) -> tuple[Floa
     return initial + initial_sd * normals[:, 0], change + (lean * normals[:, 0] + remaining_sd * normals[:, 1])
 
 
+def linear_moments(
+    solved: tuple[Sums, Terms], prior: TrackPrior, of_initial: FloatArray, of_change: FloatArray, of_terms: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Posterior mean [n, k] and covariance [n, k, k], given φ, ε, s and q, of k combinations of ξ0, Δ and the further terms
+    w with the coefficients [k], [k, n] and [k, p].
+
+    With C = L⁻¹ σGᵀ a combination G of w is Cᵀ (N_y - ξ0 N_1 - Δ N_b + z), z standard normal.
+    """
+    sums, terms = solved
+    pivot, pull = _eliminate(sums, prior)
+    a00 = sums.r + prior.initial_sd**-2
+    slope, change = sums.rb / a00, pull / pivot
+    off_initial = sums.ry / a00 - slope * change
+    of_offset, of_change = np.repeat(of_initial[:, None], pivot.size, axis=1), of_change.copy()
+    mean = prior.initial_mean * of_offset
+    own = np.zeros((terms.sd.shape[0], *of_change.shape))
+    if terms.where.size:
+        at, (n_1, n_y, n_b) = terms.where, terms.cross
+        part = of_terms.T[:, :, None] * terms.sd[:, None, :]
+        for j in range(part.shape[0]):
+            part[j] /= terms.rows[j, j]
+            part[j + 1 :] -= terms.rows[j, j + 1 : part.shape[0], None, :] * part[j]
+        own[:, :, at] = part
+        mean[:, at] += np.einsum("pkj,pj->kj", part, n_y)
+        of_offset[:, at] -= np.einsum("pkj,pj->kj", part, n_1)
+        of_change[:, at] -= np.einsum("pkj,pj->kj", part, n_b)
+    mean += of_offset * off_initial + of_change * change
+    # of two independent normals: Δ about its mean, and ξ0 about its mean given Δ
+    about = np.stack([of_offset / np.sqrt(a00), (of_change - slope * of_offset) / np.sqrt(pivot), *own])
+    return mean.T, np.einsum("ian,ibn->nab", about, about)
+
+
 def _eliminate(sums: Sums, prior: TrackPrior) -> tuple[FloatArray, FloatArray]:
     """Posterior precision of Δ with ξ0 eliminated, and the right-hand side of its normal equation; their ratio,
     right-hand side over precision, is the mean of Δ."""

@@ -75,31 +75,51 @@ class Cloud:
         )
 
 
-def entered(
-    prior: TrackPrior, history: History, cloud: Cloud, rng: np.random.Generator
-) -> tuple[Cloud, tuple[Sums, Terms] | None]:
-    """The particles reweighted by the last run of a history, each with an outlier flag for that run drawn from its
-    posterior given the rest of the particle. For a long history also the closed form at each particle, which is
-    expensive and does not depend on the batch of points; else None."""
-    as_sound = replace(cloud, outlying=np.column_stack([cloud.outlying, np.zeros(cloud.form.size, bool)]))
-    points = as_sound.placed()
-    sums, terms = pointwise(history, prior, points)
-    turned = last_outlying(history, prior, points, sums, terms, points.basis(history.progress[-1:])[0])
-    log_prior = _log_prior(prior, cloud) + _log_alive(history, cloud)
-    flag_sound, flag_outlying = log_outlying(prior, np.array([[0.0, 1.0]]))
-    sound = evidence(sums, prior) + log_prior + flag_sound
-    outlying = evidence(turned, prior) + log_prior + flag_outlying
-    total = np.logaddexp(sound, outlying)
-    is_outlying = np.log(rng.random(total.size)) < outlying - total
-    as_sound.outlying[:, -1] = is_outlying
-    log_weight = cloud.log_weight + total - cloud.log_target
-    weighed = replace(as_sound, log_weight=log_weight, log_target=np.where(is_outlying, outlying, sound))
-    if history.value.size <= WHOLE:
-        return weighed, None
-    flagged = np.flatnonzero(is_outlying)
-    if flagged.size:
-        solve_again(history, prior, weighed.taken(flagged).placed(), flagged, sums, terms)
-    return weighed, (sums, terms)
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Entered:
+    """The particles with the last run of a history taken in as a sound one, and the closed form at each (`pointwise`);
+    `log_weight` and `log_target` of the particles are still those before the run, `log_prior` [n] leaves out its flag."""
+
+    prior: TrackPrior
+    history: History
+    cloud: Cloud
+    solved: tuple[Sums, Terms]
+    log_prior: FloatArray
+
+    @classmethod
+    def of(cls, prior: TrackPrior, history: History, cloud: Cloud) -> "Entered":
+        """The particles before the last run of a history, with it taken in."""
+        sound = replace(cloud, outlying=np.column_stack([cloud.outlying, np.zeros(cloud.form.size, bool)]))
+        return cls(
+            prior=prior,
+            history=history,
+            cloud=sound,
+            solved=pointwise(history, prior, sound.placed()),
+            log_prior=_log_prior(prior, cloud) + _log_alive(history, cloud),
+        )
+
+    def weighed(self, rng: np.random.Generator) -> tuple[Cloud, tuple[Sums, Terms] | None]:
+        """The particles reweighted by the run, each with an outlier flag for it drawn from its posterior given the rest of
+        the particle. For a long history also the closed form at each particle, which is expensive and does not depend on
+        the batch of points; else None. Changes `solved` in place."""
+        prior, history, (sums, terms) = self.prior, self.history, self.solved
+        cloud, points = self.cloud, self.cloud.placed()
+        turned = last_outlying(history, prior, points, sums, terms, points.basis(history.progress[-1:])[0])
+        flag_sound, flag_outlying = log_outlying(prior, np.array([[0.0, 1.0]]))
+        sound = evidence(sums, prior) + self.log_prior + flag_sound
+        outlying = evidence(turned, prior) + self.log_prior + flag_outlying
+        total = np.logaddexp(sound, outlying)
+        is_outlying = np.log(rng.random(total.size)) < outlying - total
+        flags = np.column_stack([cloud.outlying[:, :-1], is_outlying])
+        log_weight = cloud.log_weight + total - cloud.log_target
+        target = np.where(is_outlying, outlying, sound)
+        weighed = replace(cloud, outlying=flags, log_weight=log_weight, log_target=target)
+        if history.value.size <= WHOLE:
+            return weighed, None
+        flagged = np.flatnonzero(is_outlying)
+        if flagged.size:
+            solve_again(history, prior, weighed.taken(flagged).placed(), flagged, sums, terms)
+        return weighed, (sums, terms)
 
 
 def log_target_of(history: History, prior: TrackPrior, cloud: Cloud) -> FloatArray:
@@ -197,8 +217,16 @@ class Particle:
 
     def update(self, state: ParticleState, measurement: Measurement, rng: np.random.Generator) -> ParticleState:
         """The state after one more measurement."""
-        prior, history = state.prior, state.history.append(measurement, state.prior)
-        cloud, solved = entered(prior, history, state.cloud, rng)
+        return self.settled(self.entered(state, measurement), rng)
+
+    def entered(self, state: ParticleState, measurement: Measurement) -> Entered:
+        """The first half of `update`: the measurement taken in as a sound one."""
+        return Entered.of(state.prior, state.history.append(measurement, state.prior), state.cloud)
+
+    def settled(self, entered: Entered, rng: np.random.Generator) -> ParticleState:
+        """The second half of `update`: the particles weighed, and moved or laid again where too few of them count."""
+        prior, history = entered.prior, entered.history
+        cloud, solved = entered.weighed(rng)
         weight = normalised(cloud.log_weight)
         effective = float(1.0 / np.square(weight).sum())
         if effective < 0.25 * self.particles or weight @ cloud.outlying[:, -1] > 0.5:

@@ -1,10 +1,10 @@
 """filterpy's unscented Kalman filter on eq. 6, one for each probable form (`courses`), started from the particles.
 
 Nothing is carried: φ spans decades within the sigma points of a whole life, and a normal that goes along leaves the
-curved ridge. At every test the particles before it (`particle`) give each form its mean and covariance, filterpy
-leads them on and takes in the test, and the likelihoods weigh the forms. It is another way from one test to the next,
-by moments in place of weights, and as good as a normal is: good on the ridge of eq. 6, approximate on those of other
-courses, where answers say so.
+curved ridge. At every test the particles before it (`particle`) give each form its mean and covariance, in closed form
+(`before_last`); filterpy leads them on and takes in the test, and the likelihoods weigh the forms. It is another way from
+one test to the next, by moments in place of weights, and as good as a normal is: good on the ridge of eq. 6, approximate
+on those of other courses, where answers say so.
 
 The state is (ξ0, ξ at the last test before, log τ, log ε, δ, T δ', log s, and the step of each event): in logarithms
 φ = τε, ε and s cannot leave their domain, and with ξ at a test in place of Δ the ridge of the posterior is nearly
@@ -37,14 +37,15 @@ from models.tracking.courses import (
     log_scale_at,
     place_of,
 )
-from models.tracking.criteria import DOMAIN, FEWEST_BEFORE
-from models.tracking.discrepancy import PAST, drawn, value_and_slope_now
-from models.tracking.filters.particle import Particle, ParticleState
+from models.tracking.criteria import DOMAIN, FEWEST_BEFORE, LEAST_FORM
+from models.tracking.discrepancy import PAST, columns, drawn, value_and_slope
+from models.tracking.filters.particle import Entered, Particle, ParticleState
 from models.tracking.history import History, span_of
+from models.tracking.linear_model import linear_moments
 from models.tracking.measurement import Measurement
 from models.tracking.posterior import TrackPosterior
 from models.tracking.prior import TrackPrior
-from models.tracking.sampling import spread_normals, systematic
+from models.tracking.sampling import normalised, spread_normals, systematic
 
 #: Numbers of a state before its steps, and which of them are those of δ.
 BEFORE_STEPS, DELTA = 7, slice(4, 6)
@@ -107,11 +108,10 @@ class UkfState:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ukf:
-    """The filter: the particle filter, and at every test filterpy's step from the moments of `moments` of its draws."""
+    """The filter: the particle filter, and at every test filterpy's step from the moments of its particles."""
 
     name: ClassVar[str] = "ukf"
     particle: Particle = field(default_factory=Particle)
-    moments: int = 2_000
 
     def start(self, prior: TrackPrior) -> UkfState:
         """The state before any measurement."""
@@ -119,13 +119,11 @@ class Ukf:
 
     def update(self, state: UkfState, measurement: Measurement, rng: np.random.Generator) -> UkfState:
         """The state with one more measurement: particles, and the normals updated by it."""
-        before, prior = state.history, state.prior
-        particles = self.particle.update(state.particles, measurement, rng)
+        before, entered = state.history, self.particle.entered(state.particles, measurement)
         in_order = measurement.progress >= before.span and measurement.epoch >= before.epoch.max(initial=0.0)
-        if before.value.size < FEWEST_BEFORE or not in_order:
-            return UkfState(particles=particles, normals=Normals.none())
-        draws = self.particle.posterior(state.particles, self.moments, np.random.default_rng(0))
-        return UkfState(particles=particles, normals=stepped(draws, particles.history, prior))
+        ready = before.value.size >= FEWEST_BEFORE and in_order
+        normals = stepped(entered) if ready else Normals.none()
+        return UkfState(particles=self.particle.settled(entered, rng), normals=normals)
 
     def passed(self, state: UkfState, measurement: Measurement, rng: np.random.Generator) -> UkfState:
         """The state with one more measurement, without normals, because no answer is asked for after it."""
@@ -151,7 +149,7 @@ class Ukf:
         change = (at_reference - initial) / progress_fraction(normals.reference, scale, exponent)
         worn = -change * progress_fraction(history.span, scale, exponent) / initial
         ends = np.stack([delta, slope * history.span / normals.reference])
-        smooth = np.where(FORM_SIZE[form, None] > 0.0, (np.linalg.pinv(value_and_slope_now()) @ ends).T, 0.0)
+        smooth = np.where(FORM_SIZE[form, None] > 0.0, (np.linalg.pinv(value_and_slope(1.0, 1.0)) @ ends).T, 0.0)
         terms = np.column_stack([smooth, *steps])
         return TrackPosterior(
             weight=np.where(ended, 0.0, 1.0 / np.count_nonzero(~ended)),
@@ -165,21 +163,17 @@ class Ukf:
         )
 
 
-def stepped(before: TrackPosterior, history: History, prior: TrackPrior) -> Normals:
-    """The normals of draws `before` the last run of a history, with it taken in; none where it is more probably outlying."""
-    reference = span_of(history.progress[:-1])
-    rows = _rows(before, reference)
-    new = history.step_sizes(prior)[rows.shape[1] - BEFORE_STEPS :]
-    points, form = scaled(prior, np.column_stack([rows, *np.zeros((new.size, len(rows)))])), before.form
-    shares = np.bincount(form, weights=before.weight, minlength=FORM_SIZE.size)
-    # a covariance of d numbers needs more than d draws
-    enough = np.bincount(form, minlength=FORM_SIZE.size) > 2 * points.shape[1]
-    forms = np.flatnonzero(enough | (shares == shares.max()))
+def stepped(entered: Entered) -> Normals:
+    """The normals of particles before the last run of a history, with it taken in; none where it is more probably
+    outlying."""
+    prior, history = entered.prior, entered.history
+    reference, form = span_of(history.progress[:-1]), entered.cloud.form.astype(np.intp)
+    weight, (states, covariances) = normalised(entered.cloud.log_weight), before_last(entered, reference)
+    shares = np.bincount(form, weights=weight, minlength=FORM_SIZE.size)
+    forms = np.flatnonzero((shares > LEAST_FORM) | (shares == shares.max()))
     taken, weights = [], []
     for kind in forms.tolist():
-        mean, covariance = _moments(points[form == kind], before.weight[form == kind])
-        fresh = np.arange(points.shape[1] - new.size, points.shape[1])
-        covariance[fresh, fresh] = (new * prior.size / prior.initial_sd) ** 2
+        mean, covariance = _moments(states[form == kind], covariances[form == kind], weight[form == kind])
         for density, normal in _taken_in(mean, covariance, kind, reference, history, prior):
             taken.append(normal)
             weights.append(shares[kind] * density)
@@ -193,6 +187,37 @@ def stepped(before: TrackPosterior, history: History, prior: TrackPrior) -> Norm
         mean=np.stack([np.clip(mean, -DOMAIN, DOMAIN) for mean, _ in taken]),
         covariance=np.stack([definite(covariance) for _, covariance in taken]),
     )
+
+
+def before_last(entered: Entered, reference: float) -> tuple[FloatArray, FloatArray]:
+    """Every particle's mean [n, d] and covariance [n, d, d] of a state given all runs but the last, in closed form.
+
+    Given a particle the last value y is a linear combination of the state beside it, with noise of variance d: where that
+    has the mean m, the variance v and the covariance c with the state, the mean without it is off by c (m - y)/(d - v), and
+    the covariance by c cᵀ/(d - v).
+    """
+    prior, history, points = entered.prior, entered.history, entered.cloud.placed()
+    now, then = points.basis(history.progress[-1:])[0], points.basis(np.array([reference]))[0]
+    steps, nothing = history.steps.size, np.zeros(now.size)
+    of_terms = np.zeros((5 + steps, PAST + steps))
+    of_terms[2:4, :PAST] = value_and_slope(reference, history.span)
+    of_terms[4:-1, PAST:] = np.eye(steps)
+    of_terms[-1] = columns(history)[-1]
+    of_initial = np.array([1.0, 1.0, *np.zeros(2 + steps), 1.0])
+    of_change = np.stack([nothing, then, *[nothing] * (2 + steps), now])
+    mean, covariance = linear_moments(entered.solved, prior, of_initial, of_change, of_terms)
+    noise = history.variance[-1] + np.exp(2.0 * points.log_scatter) * np.where(
+        FORM_PROPORTIONAL[points.form], prior.relative_squared(history.value[-1]), 1.0
+    )
+    shared, left = covariance[:, :-1, -1], np.maximum(noise - covariance[:, -1, -1], 1e-9 * noise)[:, None]
+    mean = mean[:, :-1] + shared * (mean[:, -1:] - history.value[-1]) / left
+    covariance = covariance[:, :-1, :-1] + shared[:, :, None] * (shared / left)[:, None, :]
+    places = place_of(points.log_scale, points.course, reference)
+    rows = np.column_stack([mean[:, :2], places, points.log_exponent, mean[:, 2:4], points.log_scatter, mean[:, 4:]])
+    of_state = np.zeros((rows.shape[0], rows.shape[1], rows.shape[1]))
+    linear = np.array([0, 1, 4, 5, *range(BEFORE_STEPS, rows.shape[1])])
+    of_state[:, linear[:, None], linear] = covariance / prior.initial_sd**2
+    return scaled(prior, rows), of_state
 
 
 def _taken_in(
@@ -243,23 +268,6 @@ def coefficients(
     return coefficients_at(log_scale, log_exponent, course)
 
 
-def _rows(draws: TrackPosterior, reference: float) -> FloatArray:
-    """Draws as rows of (ξ0, ξ at the reference, place, log ε, δ, T δ', log s, steps) [n, d]."""
-    beside, size = draws.discrepancy, draws.weight.size
-    delta = np.zeros((size, 2)) if beside is None else beside.curvature[:, :PAST] @ value_and_slope_now().T
-    return np.column_stack(
-        [
-            draws.initial,
-            draws.initial + draws.change * progress_fraction(reference, draws.scale, draws.exponent),
-            place_of(draws.log_scale, draws.course, reference),
-            draws.log_exponent,
-            delta,
-            np.log(draws.scatter),
-            np.zeros((size, 0)) if beside is None else beside.height,
-        ]
-    )
-
-
 def _units(prior: TrackPrior, dimension: int) -> tuple[FloatArray, FloatArray]:
     """Centres and units of (ξ0, ξ at the reference, log τ, log ε, δ, T δ', log s, steps)."""
     level, rate = prior.initial_mean, prior.log_scale_mean - prior.log_exponent_mean
@@ -271,7 +279,7 @@ def _units(prior: TrackPrior, dimension: int) -> tuple[FloatArray, FloatArray]:
 
 
 def scaled(prior: TrackPrior, points: FloatArray) -> FloatArray:
-    """Rows of `_rows` as states [n, d]."""
+    """Rows of (ξ0, ξ at the reference, place, log ε, δ, T δ', log s, steps) as states [n, d]."""
     centre, unit = _units(prior, points.shape[1])
     rows = points.copy()
     rows[:, 2] -= rows[:, 3]
@@ -296,8 +304,9 @@ def definite(covariance: FloatArray, least: float = 1e-10) -> FloatArray:
     return np.asarray(0.5 * (lifted + lifted.T))
 
 
-def _moments(points: FloatArray, weight: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _moments(means: FloatArray, covariances: FloatArray, weight: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Mean [d] and covariance [d, d] of a mixture of normals [n, d], [n, d, d]."""
     share = weight / weight.sum()
-    mean = share @ points
-    off = points - mean
-    return np.clip(mean, -DOMAIN, DOMAIN), definite((share * off.T) @ off)
+    mean = share @ means
+    off = means - mean
+    return np.clip(mean, -DOMAIN, DOMAIN), definite((share * off.T) @ off + np.tensordot(share, covariances, axes=1))
