@@ -4,12 +4,16 @@ A run that is appended to the history, which changes nothing that was there, is 
 From a history at an earlier revision the present one is reached where every revision in between is that of such a run. Any
 other change (a run that is confirmed, corrected or withdrawn, a new level, a model that is adopted, a replay) leaves a gap:
 then all is read again. So it does not matter which process or service stored the runs.
+
+The filters' states are kept with the sample that was drawn of them, for which the next run asks again, at the revision with
+which they were stored alone.
 """
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import reduce
+from typing import Any
 
 import numpy as np
 from sqlalchemy import Connection
@@ -28,9 +32,10 @@ from service.clutch.timeline import (
     order,
     with_event,
 )
+from service.clutch.tracking import States
 from storage import assumptions, clutches, results, runs
 from storage.clutches import ClutchRow
-from storage.engine.database import kept_of
+from storage.engine.database import STATES, Database, kept_of
 from storage.results import FitRow
 from storage.runs import RunInOrder
 
@@ -63,6 +68,14 @@ class KeptFits:
     revision: int
     last_key: int
     levels: Mapping[str, list[LevelFit]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class KeptFilters:
+    """The filters' states after the last run of a clutch at a revision, with the samples that were drawn of them."""
+
+    revision: int
+    filters: States
 
 
 def history(connection: Connection, row: ClutchRow) -> KeptHistory:
@@ -173,6 +186,28 @@ def _levels(connection: Connection, clutch_id: str, beyond: int = 0) -> dict[str
     names = {run_key: run_id for run_id, run_key in runs.keys(connection, clutch_id).items()}
     of_runs = results.fits_of(connection, clutch_id, beyond)
     return {names[run_key]: [level_fit(row) for row in rows] for run_key, rows in of_runs.items()}
+
+
+def filters(connection: Connection, row: ClutchRow) -> States | None:
+    """The states kept at the revision of `row`; None if there are none."""
+    kept = kept_of(connection, STATES)
+    found: KeptFilters | None = None if kept is None else kept.get(row.clutch_id)
+    return found.filters if found is not None and found.revision == row.revision else None
+
+
+def keep_filters(database: Database, clutch_id: str, revision: int, filters: States) -> None:
+    """Keep the states that were stored with a revision."""
+    lean = {method: tracked.lean for method, tracked in filters.items()}
+    database.kept[STATES].put(clutch_id, KeptFilters(revision=revision, filters=lean), _array_bytes(lean))
+
+
+def _array_bytes(value: Any) -> int:
+    """Bytes of all arrays in a value."""
+    if isinstance(value, np.ndarray):
+        return value.nbytes
+    if isinstance(value, dict):
+        return sum(map(_array_bytes, value.values()))
+    return sum(_array_bytes(getattr(value, field.name)) for field in fields(value)) if is_dataclass(value) else 0
 
 
 def level_fit(row: FitRow) -> LevelFit:

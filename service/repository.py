@@ -55,6 +55,7 @@ from service.clutch.tracking import CARRIED, PREDICTED, States, Tracked
 from service.clutch.with_held import ClutchMeasurements, engagement_rows, needs_evidence, summarised
 from service.errors import BusyError, InvalidError, NotFoundError, unknown_clutch
 from service.kept_history import FIT_COLUMNS, event_of, history
+from service.kept_history import filters as kept_filters
 from service.kept_history import levels as levels_of
 from service.logging import request_id
 from service.settings import CODE_VERSION
@@ -396,8 +397,10 @@ def states_finding(connection: Connection, row: ClutchRow) -> str | None:
 
 
 def _filters(connection: Connection, row: ClutchRow) -> States | None:
-    """The stored filter states; None if they are damaged or of another release, so that the clutch is tracked from its
-    runs."""
+    """The filter states, kept or stored; None if they are damaged or of another release, so that the clutch is tracked from
+    its runs."""
+    if (kept := kept_filters(connection, row)) is not None:
+        return kept
     try:
         rows = {method: row for (method, _), row in results.filter_states_of(connection, row.clutch_id).items()}
     except DamagedData as error:

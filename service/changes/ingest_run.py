@@ -39,7 +39,7 @@ from service.clutch.recomputation import (
 )
 from service.clutch.with_held import ClutchMeasurements, held_summary, needs_evidence, summarised
 from service.errors import ArchivedError, BusyError, ConflictError, Notice, TooLargeError
-from service.kept_history import FOLLOWS
+from service.kept_history import FOLLOWS, keep_filters
 from service.settings import CODE_VERSION
 from storage import changes, raw_columns, results, runs
 from storage.engine.database import Database
@@ -151,8 +151,12 @@ def _ingested(
             raise ArchivedError(f"clutch {clutch_id!r} is archived and takes no more runs")
         outcome = _computed(database, before, arrival, (geometry, torque_filter))
         with database.writing(of=clutch_id) as connection:  # another process's run of the same name moves the revision
-            if repository.unchanged(connection, clutch_id, outcome.revision):
-                return _store(connection, clutch_id, arrival, columns, outcome, by=by), True
+            if not repository.unchanged(connection, clutch_id, outcome.revision):
+                continue
+            answer, revision = _store(connection, clutch_id, arrival, columns, outcome, by=by)
+        if outcome.results.tracking is not None:
+            keep_filters(database, clutch_id, revision, outcome.results.tracking.filters)
+        return answer, True
 
 
 def _stored(connection: Connection, clutch_id: str, run: IncomingRun) -> RunRow | None:
@@ -333,8 +337,9 @@ def _store(
     outcome: _Outcome,
     *,
     by: str,
-) -> Receipt:
-    """Store the run, its channels and fits, and the changes of other runs; move the revision on. Returns the receipt."""
+) -> tuple[Receipt, int]:
+    """Store the run, its channels and fits, and the changes of other runs; move the revision on. Returns the receipt and
+    the new revision."""
     run = arrival.run
     row = RunRow(
         clutch_id=clutch_id,
@@ -360,7 +365,7 @@ def _store(
         changes.insert(
             connection, clutch_id, changes.HOLD, {}, held, run_id=run.run_id, at=at, by=by, revision=revision
         )
-    return repository.receipt(row)
+    return repository.receipt(row), revision
 
 
 def _event_of(arrival: Arrival) -> timeline.Event:

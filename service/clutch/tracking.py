@@ -85,6 +85,17 @@ class Tracked:
         back_cast = {name: getattr(self.back_cast, name) for name in ("forecasts", "misses", "innovation")}
         return named | {f"{_BACK_CAST}/{name}": array for name, array in back_cast.items()}
 
+    @property
+    def lean(self) -> "Tracked":
+        """The same without what is large and computed again at the same bits: the closed form at the particles."""
+        states = {
+            name: replace(state, particles=replace(state.particles, solved=None))
+            if isinstance(state, UkfState)
+            else state
+            for name, state in self.states.items()
+        }
+        return replace(self, states=states)
+
     @classmethod
     def from_arrays(cls, runs: int, arrays: Mapping[str, FloatArray | NDArray[np.bool_]]) -> "Tracked":
         """The inverse of `to_arrays`, of the carried filter."""

@@ -32,6 +32,8 @@ LOCK_TIMEOUT = 10.0
 #: Bytes of what reading transactions found that are kept in the memory of a process. Chosen: a clutch of 1,000 tests with
 #: all its fits, or ten without; there are some six processes.
 MAX_KEPT_BYTES = 32 * 2**20
+#: What is kept: histories, and filter states, each up to so many bytes.
+HISTORIES, STATES = "histories", "states"
 #: The option of a connection by which what is kept is found.
 _KEPT = "clutchlife_kept"
 
@@ -198,11 +200,11 @@ class Kept:
                 self._bytes -= self._values.popitem(last=False)[1][1]
 
 
-def kept_of(connection: Connection) -> Kept | None:
-    """The memory cache of a database, for a read-only transaction; None in a writing one, whose changes may be rolled
+def kept_of(connection: Connection, what: str = HISTORIES) -> Kept | None:
+    """A memory cache of a database, for a read-only transaction; None in a writing one, whose changes may be rolled
     back."""
-    kept: Kept | None = connection.get_execution_options().get(_KEPT)
-    return kept
+    kept: dict[str, Kept] | None = connection.get_execution_options().get(_KEPT)
+    return None if kept is None else kept[what]
 
 
 class Database(ABC):
@@ -222,7 +224,7 @@ class Database(ABC):
         self.name = name
         self._found = found
         self._closed = False
-        self._kept = Kept(MAX_KEPT_BYTES)
+        self.kept = {what: Kept(MAX_KEPT_BYTES) for what in (HISTORIES, STATES)}
 
     @contextmanager
     def reading(self) -> Iterator[Connection]:
@@ -234,7 +236,7 @@ class Database(ABC):
         self._refuse_closed()
         try:
             with self._read() as connection:
-                yield connection.execution_options(**{_KEPT: self._kept})
+                yield connection.execution_options(**{_KEPT: self.kept})
         except (OperationalError, ProgrammingError) as error:
             if not self._found or (revision := self._revision()) == head():
                 raise
