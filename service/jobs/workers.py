@@ -42,6 +42,8 @@ if TYPE_CHECKING:
 #: a second or more a call (files that are read, simulations) so few that the last one is answered within a minute.
 _MAX_WAITING = 256
 _MAX_WAITING_LONG = 32
+#: Turns of which it is known which worker took the last call. Derived: more than a worker keeps filter states of.
+_MAX_LAST = 1_000
 #: [s] How long a call may wait to be begun, and how long a process may say nothing. Derived: both together and the start of
 #: another process are less than the minute for which proxies and clients usually wait.
 PATIENCE = 40.0
@@ -164,7 +166,8 @@ class Workers:
         self._gauges = gauges
         self._sizes = sizes
         self._lock = threading.Lock()
-        self._ready = {lane: threading.Condition(self._lock) for lane in Lane}
+        self._asleep: dict[Lane, dict[_Worker, threading.Condition]] = {lane: {} for lane in Lane}
+        self._last: dict[str, _Worker] = {}
         self._queues: dict[Lane, deque[_Call]] = {lane: deque() for lane in Lane}
         self._turns: dict[str, deque[_Call]] = {}
         self._calls = dict.fromkeys(Lane, 0)
@@ -252,8 +255,9 @@ class Workers:
         with self._lock:
             self._closing = True
             waiting = [call for queue in (*self._queues.values(), *self._turns.values()) for call in queue]
-            for condition in self._ready.values():
-                condition.notify_all()
+            for lane in Lane:
+                while self._asleep[lane]:
+                    self._wake(lane)
             threads = [thread for lane in Lane for thread in self._threads[lane]]
         for call in waiting:
             _answer(call, BusyError(ENDING))
@@ -274,7 +278,15 @@ class Workers:
             thread = threading.Thread(target=self._work, args=(lane,), name=f"{lane.name.lower()} calls", daemon=True)
             self._threads[lane].append(thread)
             thread.start()
-        self._ready[lane].notify()
+        self._wake(lane, call.turn)
+
+    def _wake(self, lane: Lane, turn: str | None = None) -> None:
+        """Wake one of a lane's waiting workers: that of the last call with the same `turn`, for it has kept in memory what
+        the next one needs, else any. The caller holds the lock."""
+        asleep = self._asleep[lane]
+        if asleep:
+            last = self._last.get(turn or "")
+            asleep.pop(last if last in asleep else next(reversed(asleep))).notify()
 
     def _work(self, lane: Lane) -> None:
         """The loop of a worker's own thread."""
@@ -295,13 +307,20 @@ class Workers:
         with self._lock:
             self._idle[lane] += 1
             if not self._queues[lane] and not self._closing:
-                self._ready[lane].wait(_LOOK)
+                woken = self._asleep[lane][worker] = threading.Condition(self._lock)
+                woken.wait(_LOOK)
+                self._asleep[lane].pop(worker, None)
             self._idle[lane] -= 1
             if self._closing or not self._queues[lane]:
                 return None
             call = self._queues[lane].popleft()
             call.begun = time.monotonic()
             self._workers[worker] = (lane, call)
+            if call.turn is not None:
+                self._last.pop(call.turn, None)
+                self._last[call.turn] = worker
+                if len(self._last) > _MAX_LAST:
+                    del self._last[next(iter(self._last))]
             return call
 
     def _do(self, call: _Call, worker: _Worker) -> None:
@@ -321,7 +340,7 @@ class Workers:
             if retry and not self._closing:
                 call.retried, call.begun = True, None
                 self._queues[call.lane].appendleft(call)
-                self._ready[call.lane].notify()
+                self._wake(call.lane)
                 return
             self._ended(call)
         _answer(call, error, result)

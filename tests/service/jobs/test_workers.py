@@ -75,6 +75,25 @@ def test_calls_of_one_turn_run_one_after_the_other_and_hold_up_no_other(workers:
     assert [mark for mark in log.read_text().split() if "other" not in mark] == ["+a", "-a", "+b", "-b", "+c", "-c"]
 
 
+def test_an_idle_worker_takes_the_next_call_of_the_turn_that_it_had(database: Database, tmp_path: Path) -> None:
+    """What it has kept in memory of a clutch is what the clutch's next run needs."""
+    with closing(in_processes(database, 2)) as workers:
+
+        def at_rest() -> bool:
+            return len(workers._asleep[Lane.RUNS]) == 2
+
+        log, gate = tmp_path / "log", tmp_path / "gate"
+        held = [workers.submit(Lane.RUNS, calls.logged, log, turn, gate, turn=turn) for turn in "ab"]
+        until(lambda: log.exists() and len(log.read_text().split()) == 2, within=IN_TIME)
+        gate.touch()
+        assert [call.result(IN_TIME) for call in held] == ["a", "b"]
+        pids: dict[str, set[int]] = {"a": set(), "b": set()}
+        for turn in "aabab":
+            until(at_rest, within=IN_TIME)
+            pids[turn].add(workers.submit(Lane.RUNS, calls.pid, turn=turn).result(IN_TIME))
+        assert [len(each) for each in (*pids.values(), pids["a"] | pids["b"])] == [1, 1, 2]
+
+
 def test_more_than_may_wait_are_refused(workers: Workers, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "_MAX_WAITING_LONG", 2)
     gate = tmp_path / "gate"
