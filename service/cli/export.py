@@ -12,7 +12,6 @@ import json
 import shutil
 import tempfile
 from datetime import UTC, datetime
-from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated, get_args
 
@@ -20,7 +19,6 @@ import typer
 from rich.progress import Progress
 
 from service.cli.options import ClutchId, asking, err, print_line
-from service.cli.workbook import write_workbook
 from service.client.clutchlife.answers import JsonObject, RefusedError
 from service.client.clutchlife.transport import Service
 from service.runs import manifest
@@ -95,6 +93,8 @@ def _tables(service: Service, clutch: str, folder: Path) -> None:
     """Write every table of the API as CSV, all of them as sheets of a workbook, and as Parquet if its library is
     installed. Answers that the clutch does not have yet, such as surfaces before its first stationary test, are left
     out."""
+    from service.cli.workbook import write_workbook  # start-up time
+
     tables = dict[str, str]()
     for name in TABLES:
         try:
@@ -118,6 +118,8 @@ def _parquet_can_be_written() -> bool:
 
 def _description(service: Service, clutch: JsonObject, record: JsonObject) -> JsonObject:
     """The description of an export: the release, the settings of the clutch, and the hashes of its data."""
+    from importlib.metadata import version  # start-up time
+
     runs = service.pages(f"/v1/clutches/{clutch['clutch_id']}/runs")
     return {
         "clutch_id": clutch["clutch_id"],

@@ -1,7 +1,6 @@
 """The command `clutchlife`: every command, in the order in which `--help` lists them."""
 
 from collections.abc import Callable
-from importlib.metadata import version
 from typing import Annotated, Any
 
 import typer
@@ -31,6 +30,8 @@ from service.cli.serving import serve
 
 def _version(wanted: bool) -> None:
     if wanted:
+        from importlib.metadata import version  # start-up time
+
         typer.echo(f"clutchlife {version('clutchlife')}")
         raise typer.Exit
 

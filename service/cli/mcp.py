@@ -7,7 +7,6 @@ import json
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from importlib.metadata import version
 from typing import Any
 from urllib.parse import quote
 
@@ -159,6 +158,8 @@ def answered(service: Service, line: str) -> JsonObject | None:
         return None
     name, parameters = message["id"], message.get("params")
     given: JsonObject = parameters if isinstance(parameters, dict) else {}
+    from importlib.metadata import version  # start-up time
+
     match message["method"]:
         case "initialize":
             asked = given.get("protocolVersion")

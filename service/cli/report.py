@@ -10,7 +10,6 @@ import typer
 
 from service.cli import printing
 from service.cli.options import asking, err, print_line
-from service.cli.workbook import write_workbook
 from service.client.clutchlife.answers import JsonObject, RefusedError, ServiceAwayError
 from service.client.clutchlife.transport import Service
 
@@ -60,6 +59,8 @@ def report(
 
 def _written(service: Service, names: Sequence[str], folder: Path, *, pdf: bool) -> list[Path]:
     """Write the files of one report. Their names have the day, so a second report of a day replaces the first."""
+    from service.cli.workbook import write_workbook  # start-up time
+
     clutches = [service.get(f"/v1/clutches/{name}") for name in names] or list(service.pages("/v1/clutches"))
     alarms = [event for event in service.pages("/v1/alarms/events") if not names or event["clutch_id"] in names]
     folder.mkdir(parents=True, exist_ok=True)
