@@ -77,7 +77,7 @@ DEPTH = 9.0
 MOST = 6
 #: Deviations from the prior mean that an unscented filter's state may reach. Chosen; no table.
 DOMAIN = 6.0
-#: A form of less probability before a test has no normal there. Chosen: docs/appendix/prognosis.md (beside the exact posterior).
+#: A form of less probability before a test has no normal. Chosen: docs/appendix/prognosis.md (beside the exact posterior).
 LEAST_FORM = 0.007
 
 # Older tests of a long history (`merged_tests`)

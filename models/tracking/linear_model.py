@@ -121,8 +121,8 @@ def drawn_pair(sums: Sums, prior: TrackPrior, normals: FloatArray) -> tuple[Floa
 def linear_moments(
     solved: tuple[Sums, Terms], prior: TrackPrior, of_initial: FloatArray, of_change: FloatArray, of_terms: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Posterior mean [n, k] and covariance [n, k, k], given φ, ε, s and q, of k combinations of ξ0, Δ and the further terms
-    w with the coefficients [k], [k, n] and [k, p].
+    """Posterior mean [k, n] and factors F [i, k, n] of the covariance Σ_i F_i F_iᵀ, given φ, ε, s and q, of k combinations
+    of ξ0, Δ and the further terms w with the coefficients [k], [k, n] and [k, p].
 
     With C = L⁻¹ σGᵀ a combination G of w is Cᵀ (N_y - ξ0 N_1 - Δ N_b + z), z standard normal.
     """
@@ -146,8 +146,8 @@ def linear_moments(
         of_change[:, at] -= np.einsum("pkj,pj->kj", part, n_b)
     mean += of_offset * off_initial + of_change * change
     # of two independent normals: Δ about its mean, and ξ0 about its mean given Δ
-    about = np.stack([of_offset / np.sqrt(a00), (of_change - slope * of_offset) / np.sqrt(pivot), *own])
-    return mean.T, np.einsum("ian,ibn->nab", about, about)
+    about = np.stack([of_offset / np.sqrt(a00), (of_change - slope * of_offset) / np.sqrt(pivot)])
+    return mean, np.concatenate([about, own])
 
 
 def _eliminate(sums: Sums, prior: TrackPrior) -> tuple[FloatArray, FloatArray]:

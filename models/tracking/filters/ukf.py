@@ -168,12 +168,12 @@ def stepped(entered: Entered) -> Normals:
     outlying."""
     prior, history = entered.prior, entered.history
     reference, form = span_of(history.progress[:-1]), entered.cloud.form.astype(np.intp)
-    weight, (states, covariances) = normalised(entered.cloud.log_weight), before_last(entered, reference)
+    weight, (states, factors) = normalised(entered.cloud.log_weight), before_last(entered, reference)
     shares = np.bincount(form, weights=weight, minlength=FORM_SIZE.size)
     forms = np.flatnonzero((shares > LEAST_FORM) | (shares == shares.max()))
     taken, weights = [], []
     for kind in forms.tolist():
-        mean, covariance = _moments(states[form == kind], covariances[form == kind], weight[form == kind])
+        mean, covariance = _moments(states[form == kind], factors[..., form == kind], weight[form == kind])
         for density, normal in _taken_in(mean, covariance, kind, reference, history, prior):
             taken.append(normal)
             weights.append(shares[kind] * density)
@@ -190,7 +190,8 @@ def stepped(entered: Entered) -> Normals:
 
 
 def before_last(entered: Entered, reference: float) -> tuple[FloatArray, FloatArray]:
-    """Every particle's mean [n, d] and covariance [n, d, d] of a state given all runs but the last, in closed form.
+    """Every particle's mean [n, d] of a state given all runs but the last, in closed form, and factors F [i, k, n] of the
+    covariance Σ_i F_i F_iᵀ of its k `linear` numbers; the others are the particle's own.
 
     Given a particle the last value y is a linear combination of the state beside it, with noise of variance d: where that
     has the mean m, the variance v and the covariance c with the state, the mean without it is off by c (m - y)/(d - v), and
@@ -205,19 +206,23 @@ def before_last(entered: Entered, reference: float) -> tuple[FloatArray, FloatAr
     of_terms[-1] = columns(history)[-1]
     of_initial = np.array([1.0, 1.0, *np.zeros(2 + steps), 1.0])
     of_change = np.stack([nothing, then, *[nothing] * (2 + steps), now])
-    mean, covariance = linear_moments(entered.solved, prior, of_initial, of_change, of_terms)
+    mean, factors = linear_moments(entered.solved, prior, of_initial, of_change, of_terms)
     noise = history.variance[-1] + np.exp(2.0 * points.log_scatter) * np.where(
         FORM_PROPORTIONAL[points.form], prior.relative_squared(history.value[-1]), 1.0
     )
-    shared, left = covariance[:, :-1, -1], np.maximum(noise - covariance[:, -1, -1], 1e-9 * noise)[:, None]
-    mean = mean[:, :-1] + shared * (mean[:, -1:] - history.value[-1]) / left
-    covariance = covariance[:, :-1, :-1] + shared[:, :, None] * (shared / left)[:, None, :]
-    places = place_of(points.log_scale, points.course, reference)
-    rows = np.column_stack([mean[:, :2], places, points.log_exponent, mean[:, 2:4], points.log_scatter, mean[:, 4:]])
-    of_state = np.zeros((rows.shape[0], rows.shape[1], rows.shape[1]))
-    linear = np.array([0, 1, 4, 5, *range(BEFORE_STEPS, rows.shape[1])])
-    of_state[:, linear[:, None], linear] = covariance / prior.initial_sd**2
-    return scaled(prior, rows), of_state
+    shared = np.einsum("ikn,in->kn", factors, factors[:, -1])
+    left = np.sqrt(np.maximum(noise - shared[-1], 1e-9 * noise))
+    shared, off = shared / left, (mean[-1] - history.value[-1]) / left
+    mean, factors = mean[:-1] + shared[:-1] * off, np.concatenate([factors, shared[None]])[:, :-1]
+    rows = np.empty((mean.shape[0] + 3, now.size))
+    rows[linear(rows.shape[0])] = mean
+    rows[[2, 3, 6]] = place_of(points.log_scale, points.course, reference), points.log_exponent, points.log_scatter
+    return scaled(prior, rows.T), factors / prior.initial_sd
+
+
+def linear(dimension: int) -> NDArray[np.intp]:
+    """Which numbers of a state are linear: (ξ0, ξ at the reference, δ, T δ', steps)."""
+    return np.array([0, 1, 4, 5, *range(BEFORE_STEPS, dimension)])
 
 
 def _taken_in(
@@ -304,9 +309,11 @@ def definite(covariance: FloatArray, least: float = 1e-10) -> FloatArray:
     return np.asarray(0.5 * (lifted + lifted.T))
 
 
-def _moments(means: FloatArray, covariances: FloatArray, weight: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Mean [d] and covariance [d, d] of a mixture of normals [n, d], [n, d, d]."""
+def _moments(means: FloatArray, factors: FloatArray, weight: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Mean [d] and covariance [d, d] of a mixture of normals, of means [n, d] and factors [i, k, n] (`before_last`)."""
     share = weight / weight.sum()
     mean = share @ means
-    off = means - mean
-    return np.clip(mean, -DOMAIN, DOMAIN), definite((share * off.T) @ off + np.tensordot(share, covariances, axes=1))
+    off, within = means - mean, linear(mean.size)
+    covariance = (share * off.T) @ off
+    covariance[within[:, None], within] += np.tensordot(share * factors, factors, ((0, 2), (0, 2)))
+    return np.clip(mean, -DOMAIN, DOMAIN), definite(covariance)
