@@ -29,6 +29,8 @@ from models.tracking.sampling import systematic
 #: Of these every so many'th is looked at first. A dip below the threshold and back between two of them is not seen: the
 #: course beside eq. 6 bends some twenty times, and steps are looked at by themselves.
 _STRIDE = 6
+#: Parts of these places, one after the other: of a part only the draws are looked at that have not passed before it.
+_PARTS = 3
 
 #: A given course over ζ [k] that is added to eq. 6, in the quantity's unit; [b, k] for each branch of the sample
 #: (`TrackPosterior.branch`), or [1, k] for all.
@@ -169,18 +171,33 @@ def _along_paths(posterior: TrackPosterior, fraction: float, offset: Offset | No
     course = np.zeros((places.size, 1)) if offset is None else posterior.beside(offset(places))
     stride = _STRIDE if offset is None else 1
     sparse = np.unique(np.concatenate([np.arange(0, places.size, stride), steps, steps - 1, [places.size - 1]]))
-    above = posterior.values(places[sparse]) + course[sparse]
-    level = fraction * above[0]
-    below = above <= level
-    first = below.argmax(axis=0)
-    passed = np.flatnonzero(below.any(axis=0))
-    left = sparse[np.maximum(first[passed] - 1, 0)]
-    index = np.minimum(left + np.arange(_STRIDE + 1)[:, None], sparse[first[passed]])
+    count = posterior.weight.size
+    # of every draw the place at which it first lies below, and the one before; its level
+    first, before, level = np.full(count, -1), np.zeros(count, dtype=np.intp), np.zeros(count)
+    left = np.arange(count)
+    for rows in np.array_split(np.arange(sparse.size), _PARTS):
+        draws = posterior.taken(left, posterior.weight[left]) if left.size < count else posterior
+        above = draws.values(places[sparse[rows]]) + _of_draws(course[sparse[rows]], left)
+        if rows[0] == 0:
+            level = fraction * above[0]
+        below = above <= level[left]
+        found, row = below.any(axis=0), rows[below.argmax(axis=0)]
+        first[left[found]], before[left[found]] = sparse[row[found]], sparse[np.maximum(row[found] - 1, 0)]
+        left = left[~found]
+        if left.size == 0:
+            break
+    passed = np.flatnonzero(first >= 0)
+    index = np.minimum(before[passed] + np.arange(_STRIDE + 1)[:, None], first[passed])
     path_rows = np.zeros(1, dtype=np.intp) if course.shape[1] == 1 else passed
     near = posterior.taken(passed, posterior.weight[passed]).values(places[index]) + course[index, path_rows]
-    passages = np.full(first.size, np.inf)
+    passages = np.full(count, np.inf)
     passages[passed] = first_below(near, places[index], level[passed])
     return passages
+
+
+def _of_draws(course: FloatArray, draws: NDArray[np.intp]) -> FloatArray:
+    """The rows [k, m] of some draws of a course [k, n], or [k, 1] where it is one for all."""
+    return course if course.shape[1] == 1 else course[:, draws]
 
 
 def _places(beside: CourseDiscrepancy | None, horizon: float) -> tuple[FloatArray, NDArray[np.intp]]:
