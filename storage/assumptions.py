@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
-from sqlalchemy import Connection, Select, delete, func, select
+from sqlalchemy import Connection, Select, bindparam, delete, func, select
 
 from storage.dialects import json_length
 from storage.encoding import Json, to_list, to_text
@@ -30,6 +30,12 @@ class AdoptedRow:
 
 
 _adoptions = Rows(AdoptedRow, of=adopted_model)
+_corrected = (
+    select(corrected_cof)
+    .join(run, run.c.run_key == corrected_cof.c.run_key)
+    .where(run.c.clutch_id == bindparam("of"), run.c.run_key > bindparam("beyond"))
+    .order_by(corrected_cof.c.run_key, corrected_cof.c.pressure)
+)
 
 
 def _adopted(clutch_id: str) -> Select[Any]:
@@ -56,13 +62,7 @@ def corrected_cofs_of(connection: Connection, clutch_id: str, beyond: int = 0) -
     """run_key -> pressure -> mean COF, its standard deviation, and mean COF under each draw, of the runs that the model
     in force corrects, with keys `beyond` that one."""
     cofs: dict[int, dict[float, CorrectedCof]] = {}
-    query = (
-        select(corrected_cof)
-        .join(run, run.c.run_key == corrected_cof.c.run_key)
-        .where(run.c.clutch_id == clutch_id, run.c.run_key > beyond)
-        .order_by(corrected_cof.c.run_key, corrected_cof.c.pressure)
-    )
-    rows = connection.execute(query)
+    rows = connection.execute(_corrected, {"of": clutch_id, "beyond": beyond})
     damage_allowed = allows_damage(rows, corrected_cof)
     for row in rows.mappings():
         if not damage_allowed:

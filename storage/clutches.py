@@ -4,7 +4,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import ColumnElement, Connection, Select, case, func, select
+from sqlalchemy import ColumnElement, Connection, Select, bindparam, case, func, select
 
 from storage.dialects import among, json_fields
 from storage.encoding import Json, to_text
@@ -88,6 +88,7 @@ _with_raised_alarm = clutch.c.clutch_id.in_(
     select(alarm_event.c.clutch_id).where(NOT_CLEARED, alarm_event.c.acknowledged_at.is_(None))
 )
 _number = select(func.count()).select_from(clutch)
+_named, _revision = (select(what).where(clutch.c.clutch_id == bindparam("of")) for what in (clutch, clutch.c.revision))
 
 
 def insert(connection: Connection, row: ClutchRow) -> None:
@@ -96,7 +97,7 @@ def insert(connection: Connection, row: ClutchRow) -> None:
 
 
 def get(connection: Connection, clutch_id: str) -> ClutchRow | None:
-    return _stored.first(connection.execute(select(clutch).where(clutch.c.clutch_id == clutch_id)))
+    return _stored.first(connection.execute(_named, {"of": clutch_id}))
 
 
 def page(
@@ -221,19 +222,21 @@ def set_silent(connection: Connection, clutch_id: str, silent: str | None, *, st
     _change(connection, clutch_id, {"silent": silent, "state": state})
 
 
-def _change(connection: Connection, clutch_id: str, columns: Mapping[str, Any]) -> None:
-    if amend(connection, clutch, [clutch.c.clutch_id == clutch_id], **columns) != 1:
+def _change(connection: Connection, clutch_id: str, columns: Mapping[str, Any]) -> dict[str, Any]:
+    """The clutch's row with changed columns."""
+    rows = amend(connection, clutch, [clutch.c.clutch_id == clutch_id], **columns)
+    if not rows:
         raise LookupError(f"clutch {clutch_id!r} is not stored")
+    return rows[0]
 
 
 def bump_revision(connection: Connection, clutch_id: str) -> int:
     """Raise the clutch's revision by one and return it. Raises LookupError on an unknown one."""
-    _change(connection, clutch_id, {"revision": lambda row: row["revision"] + 1})
-    return int(connection.execute(select(clutch.c.revision).where(clutch.c.clutch_id == clutch_id)).scalar_one())
+    return int(_change(connection, clutch_id, {"revision": lambda row: row["revision"] + 1})["revision"])
 
 
 def revision(connection: Connection, clutch_id: str) -> int | None:
-    return connection.execute(select(clutch.c.revision).where(clutch.c.clutch_id == clutch_id)).scalar_one_or_none()
+    return connection.execute(_revision, {"of": clutch_id}).scalar_one_or_none()
 
 
 def count(connection: Connection) -> int:

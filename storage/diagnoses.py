@@ -83,7 +83,7 @@ def fail(connection: Connection, diagnosis_id: str, at: str, problem: str) -> bo
 
 def _end(connection: Connection, diagnosis_id: str, **fields: object) -> bool:
     this = (diagnosis.c.diagnosis_id == diagnosis_id, diagnosis.c.status == RUNNING)
-    return amend(connection, diagnosis, this, **_rows.columns(**fields)) == 1
+    return len(amend(connection, diagnosis, this, **_rows.columns(**fields))) == 1
 
 
 def last_run_key(connection: Connection, clutch_id: str) -> int:

@@ -79,7 +79,7 @@ def page(
 
 def set_state(connection: Connection, inspection_key: int, state: str) -> None:
     """Withdraw or restore an inspection. Raises LookupError on an unknown one."""
-    if amend(connection, inspection, [inspection.c.inspection_key == inspection_key], state=state) != 1:
+    if not amend(connection, inspection, [inspection.c.inspection_key == inspection_key], state=state):
         raise LookupError(f"inspection {inspection_key} is not stored")
 
 

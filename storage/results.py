@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from sqlalchemy import Connection, Select, delete, select
+from sqlalchemy import Connection, Select, bindparam, delete, select
 
 from storage.encoding import Json
 from storage.engine.errors import DamagedData
@@ -56,6 +56,12 @@ class FitRow:
 
 _MATRICES = ("covariance", "unbiased_covariance")
 _fits = Rows(FitRow, of=fit)
+_determined = (
+    select(fit)
+    .join(run, run.c.run_key == fit.c.run_key)
+    .where(run.c.clutch_id == bindparam("of"), run.c.run_key > bindparam("beyond"), fit.c.mean_cof.is_not(None))
+    .order_by(fit.c.run_key, fit.c.pressure)
+)
 
 
 def write_fits(connection: Connection, run_key: int, rows: Sequence[FitRow]) -> None:
@@ -87,13 +93,7 @@ def cofs_of(connection: Connection, clutch_id: str, beyond: int = 0) -> dict[int
     """run_key -> pressure -> mean COF and its standard deviation, for all curves that determine it, of runs with keys
     `beyond` that one. Raises DamagedData."""
     cofs: dict[int, dict[float, tuple[float, float]]] = {}
-    query = (
-        select(fit)
-        .join(run, run.c.run_key == fit.c.run_key)
-        .where(run.c.clutch_id == clutch_id, run.c.run_key > beyond, fit.c.mean_cof.is_not(None))
-        .order_by(fit.c.run_key, fit.c.pressure)
-    )
-    rows = connection.execute(query)
+    rows = connection.execute(_determined, {"of": clutch_id, "beyond": beyond})
     damage_allowed = allows_damage(rows, fit)
     for row in rows.mappings():
         if not damage_allowed:

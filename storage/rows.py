@@ -94,19 +94,24 @@ def amend(
     *,
     checked: bool = True,
     **columns: Any,
-) -> int:
-    """Change columns of rows, each by a value or a function of the old row; returns the number of rows. Raises
-    DamagedData."""
+) -> list[dict[str, Any]]:
+    """Change columns of rows, each by a value or a function of the old row; returns the new rows. Raises DamagedData."""
     found = connection.execute(sa.select(table).where(*this).with_for_update())
     allowed = not checked or allows_damage(found, table)
     rows = [dict(row) for row in found.mappings()]
     for row in rows:
         if not allowed:
             refuse_damaged(table, row)
-        changed = {name: value(row) if callable(value) else value for name, value in columns.items()}
-        own = [column == row[column.name] for column in table.primary_key]
-        connection.execute(sa.update(table).where(*own).values(sealed(table, {**row, **changed})))
-    return len(rows)
+        key = {f"at_{column.name}": row[column.name] for column in table.primary_key}
+        row |= {name: value(row) if callable(value) else value for name, value in columns.items()}
+        connection.execute(_update(table), key | sealed(table, row))
+    return rows
+
+
+@cache
+def _update(table: sa.Table) -> sa.Update:
+    """A row of a table, by its key `at_…`, gets the columns with which this is executed."""
+    return sa.update(table).where(*(column == sa.bindparam(f"at_{column.name}") for column in table.primary_key))
 
 
 def findings(connection: sa.Connection, table: sa.Table, this: sa.ColumnElement[bool]) -> list[str]:

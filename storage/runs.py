@@ -7,7 +7,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
-from sqlalchemy import ColumnElement, Connection, Select, TextClause, and_, exists, func, select, tuple_
+from sqlalchemy import (
+    ColumnElement,
+    Connection,
+    Result,
+    Select,
+    TextClause,
+    and_,
+    bindparam,
+    exists,
+    func,
+    select,
+    tuple_,
+)
 
 from storage.dialects import DialectPair, json_text, json_value
 from storage.encoding import Json
@@ -104,6 +116,10 @@ _light = select(
     run.c.state,
     json_value(run.c.details, "follows"),
 ).order_by(*_ORDER)
+#: Those of a clutch whose keys are beyond one.
+_beyond = run.c.clutch_id == bindparam("of"), run.c.run_key > bindparam("beyond")
+_named = select(run).where(run.c.clutch_id == bindparam("of"), run.c.run_id == bindparam("name"))
+_later, _whole = _light.where(*_beyond), select(run).where(*_beyond)
 _held = select(run.c.clutch_id, func.count()).where(HELD_ONLY).group_by(run.c.clutch_id)
 
 
@@ -114,8 +130,7 @@ def insert(connection: Connection, row: RunRow) -> int:
 
 
 def get(connection: Connection, clutch_id: str, run_id: str) -> RunRow | None:
-    query = select(run).where(run.c.clutch_id == clutch_id, run.c.run_id == run_id)
-    return _stored.first(connection.execute(query))
+    return _stored.first(connection.execute(_named, {"of": clutch_id, "name": run_id}))
 
 
 def read_again_as(connection: Connection, clutch_id: str, content_sha256: str) -> RunRow | None:
@@ -191,13 +206,13 @@ def in_history(connection: Connection, clutch_id: str) -> list[RunInOrder]:
 
 def after_key(connection: Connection, clutch_id: str, run_key: int) -> list[RunInOrder]:
     """The runs of a clutch with keys greater than that one, in order, in any state."""
-    return _in_order(connection, clutch_id, run.c.run_key > run_key)
+    return _runs_in_order(connection.execute(_later, {"of": clutch_id, "beyond": run_key}))
 
 
 def refuse_damaged_runs(connection: Connection, clutch_id: str, beyond: int = 0) -> None:
     """Raise DamagedData if any run of a clutch with a key `beyond` that one fails its checksum, in any state. Queries
     of some columns cannot check it."""
-    rows = connection.execute(_whole(clutch_id, beyond))
+    rows = connection.execute(_whole, {"of": clutch_id, "beyond": beyond})
     if not allows_damage(rows, run):
         for row in rows.mappings():
             refuse_damaged(run, dict(row))
@@ -205,12 +220,8 @@ def refuse_damaged_runs(connection: Connection, clutch_id: str, beyond: int = 0)
 
 def damaged(connection: Connection, clutch_id: str) -> set[str]:
     """The names of a clutch's runs that fail their checksums."""
-    rows = connection.execute(_whole(clutch_id, 0)).mappings()
+    rows = connection.execute(_whole, {"of": clutch_id, "beyond": 0}).mappings()
     return {row["run_id"] for row in rows if fails(run, dict(row))}
-
-
-def _whole(clutch_id: str, beyond: int) -> Select[Any]:
-    return select(run).where(run.c.clutch_id == clutch_id, run.c.run_key > beyond)
 
 
 def last_key(connection: Connection, clutch_id: str) -> int:
@@ -230,7 +241,10 @@ def set_aside(connection: Connection, clutch_id: str) -> list[RunInOrder]:
 
 
 def _in_order(connection: Connection, clutch_id: str, chosen: ColumnElement[bool] | TextClause) -> list[RunInOrder]:
-    rows = connection.execute(_light.where(run.c.clutch_id == clutch_id, chosen))
+    return _runs_in_order(connection.execute(_light.where(run.c.clutch_id == clutch_id, chosen)))
+
+
+def _runs_in_order(rows: Result[Any]) -> list[RunInOrder]:
     return [RunInOrder(**dict(zip(_LIGHT, values, strict=True))) for values in rows]
 
 
@@ -273,5 +287,5 @@ def set_state(
 
 
 def _change(connection: Connection, run_key: int, **fields: object) -> None:
-    if amend(connection, run, [run.c.run_key == run_key], **_stored.columns(**fields)) != 1:
+    if not amend(connection, run, [run.c.run_key == run_key], **_stored.columns(**fields)):
         raise LookupError(f"run {run_key} is not stored")
