@@ -486,11 +486,13 @@ class _Weighed:
         kept = (i for i in self.clutch.near if i not in self.belief.slipped)
         compared_runs = [i for i in kept if i in self.clutch.compared]
         surprise: dict[int, float] = {}
-        for i in compared_runs:
-            same_kind = [j for j in compared_runs if j != i and runs[j].kind == runs[i].kind]
-            protocol = max((runs[j].sent.log_protocol for j in same_kind), default=math.inf)
-            surprise[i] = protocol - runs[i].sent.log_protocol
-            surprise[i] += max((of_cycles[j] for j in same_kind), default=0.0) - of_cycles[i]
+        for kind in {runs[i].kind for i in compared_runs}:
+            of_kind = [i for i in compared_runs if runs[i].kind == kind]
+            protocol = _greatest_of_others([runs[i].sent.log_protocol for i in of_kind], alone=math.inf)
+            cycles = _greatest_of_others([of_cycles[i] for i in of_kind], alone=0.0)
+            for i, at_protocol, at_cycles in zip(of_kind, protocol, cycles, strict=True):
+                surprise[i] = at_protocol - runs[i].sent.log_protocol
+                surprise[i] += at_cycles - of_cycles[i]
         for life, (fit, fitted_tests) in enumerate(self.fits):
             shows = [
                 i
@@ -595,6 +597,14 @@ class _Weighed:
             if (further < -0.5 and later > 1.0) or (further > 0.5 and later < -1.0):
                 return True
         return False
+
+
+def _greatest_of_others(log_density: Sequence[float], *, alone: float) -> list[float]:
+    """The greatest log density among the others of each run; `alone` where there are none."""
+    if len(log_density) < 2:
+        return [alone] * len(log_density)
+    second, first = sorted(log_density)[-2:]
+    return [second if value == first else first for value in log_density]
 
 
 def _log_odds(share: float) -> float:
