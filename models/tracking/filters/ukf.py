@@ -173,7 +173,8 @@ def stepped(entered: Entered) -> Normals:
     forms = np.flatnonzero((shares > LEAST_FORM) | (shares == shares.max()))
     taken, weights = [], []
     for kind in forms.tolist():
-        mean, covariance = _moments(states[form == kind], factors[..., form == kind], weight[form == kind])
+        of_form = np.flatnonzero(form == kind)
+        mean, covariance = _moments(states[of_form], factors.take(of_form, axis=2), weight[of_form])
         for density, normal in _taken_in(mean, covariance, kind, reference, history, prior):
             taken.append(normal)
             weights.append(shares[kind] * density)
@@ -315,5 +316,5 @@ def _moments(means: FloatArray, factors: FloatArray, weight: FloatArray) -> tupl
     mean = share @ means
     off, within = means - mean, linear(mean.size)
     covariance = (share * off.T) @ off
-    covariance[within[:, None], within] += np.tensordot(share * factors, factors, ((0, 2), (0, 2)))
+    covariance[within[:, None], within] += np.matmul(share * factors, factors.swapaxes(1, 2)).sum(axis=0)
     return np.clip(mean, -DOMAIN, DOMAIN), definite(covariance)
