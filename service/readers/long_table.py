@@ -73,7 +73,7 @@ def valid_rows(column: FileColumn, cells: NDArray[Any], reading: Reading) -> NDA
         good = {*_GOOD}
     elif _VALID.search(column.name) and numbers == values and numbers <= {0.0, 1.0}:
         good = {0.0 if _INVALID.search(column.name) else 1.0}
-    elif len(values) < 2 or len(values) > _MOST_CODES or not _QUALITY.search(column.name):
+    elif not 1 < len(values) <= _MOST_CODES or not (_QUALITY.search(column.name) or any(map(_judges, values))):
         return None
     elif numbers == values and _DA_GOOD in numbers and max(numbers) <= _DA_MOST:
         good = {number for number in values if number in numbers and float(number) >= _DA_GOOD}
@@ -82,6 +82,11 @@ def valid_rows(column: FileColumn, cells: NDArray[Any], reading: Reading) -> NDA
     else:
         raise _which_is_good(column, codes)
     return np.array([code in good for code in codes.tolist()])
+
+
+def _judges(code: str | float) -> bool:
+    """Whether a word of a text is one for good or bad rows (`sensor fault`)."""
+    return isinstance(code, str) and not {*code.split()}.isdisjoint(_GOOD | _BAD)
 
 
 def _code(word: str) -> str | float:

@@ -46,6 +46,8 @@ _TITLES = {name: name for name in CHANNELS} | {title: name for name in _QUANTITY
 _SHORT = {name: frozenset(_of(name, "short")) for name in _QUANTITY_NAMES}
 #: Words at a name that say that its values are means.
 MEANS = {*_of("words", "means")}
+#: Words at a speed that say that it is that between both sides of the clutch.
+SLIDING = {*_of("words", "sliding")}
 _NEUTRAL = {name: MEANS.union(_of("words", "any"), _of(name, "beside")) for name in _QUANTITY_NAMES}
 _OIL, _PLATE, _REAR, _FRONT = ({*_of("words", kind)} for kind in ("oil", "plate", "rear", "front"))
 _SPREAD = {*_of("words", "spread")}

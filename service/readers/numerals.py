@@ -413,7 +413,7 @@ class Stamps:
 
         Raises InvalidError where several days may be of either order.
         """
-        slashed = (re.match(r"\s*(\d{1,4}/\d{1,2}/\d{1,4})", cell) for cell in cells if "/" in cell)
+        slashed = (re.match(r"\s*(\d{1,2}/\d{1,2}/\d{1,4})", cell) for cell in cells if "/" in cell)
         dates = {match[1] for match in slashed if match} - self._dates.keys()
         for written in dates:
             self._orders = {order for order in self._orders if _day_by(written, order) is not None} or self._orders

@@ -27,7 +27,18 @@ from service.readers.constants import (
 )
 from service.readers.limits import LONGEST_TITLE, Limits
 from service.readers.long_table import widened
-from service.readers.meanings import MEANS, SYMBOLS, Sense, has_noun, is_another, is_short_for, meaning, measures, words
+from service.readers.meanings import (
+    MEANS,
+    SLIDING,
+    SYMBOLS,
+    Sense,
+    has_noun,
+    is_another,
+    is_short_for,
+    meaning,
+    measures,
+    words,
+)
 from service.readers.numerals import is_stamp, plain, read_cells, with_unit_apart
 from service.readers.table import ALL, CELLS, COLUMNS, NO_TIME, SHEETS, ColumnChoice, FileColumn, Reading, Table, labels
 from service.readers.table_finder import CORNER, is_value
@@ -225,12 +236,16 @@ def _settled(
     table: Table, scores: Mapping[int, float], channel: str, mapping: Mapping[str, ColumnChoice], reading: Reading
 ) -> tuple[int | None, float]:
     """The likeliest column and its confidence. Rivals must all hold the same values, in any units; a pressure may be
-    the one that torque follows. None if only a person can decide."""
+    the one that torque follows, a speed the only one that is called that between both sides. None if only a person can
+    decide."""
     best = max(scores.values(), default=0.0)
     rivals = [at for at, score in scores.items() if score >= _RIVAL * best]
     rivals = [at for at in rivals if table.columns[at].unit is not None] or rivals
     if len(rivals) < 2:
         return (rivals[0], best) if rivals else (None, 1.0)
+    sliding = [at for at in rivals if channel == "speed_rpm" and SLIDING & {*words(table.columns[at].name)}]
+    if len(sliding) == 1:
+        return sliding[0], _WITH_RIVAL * best
     chosen_torque = mapping.get("torque_nm")
     of_torque = (
         at for at in range(len(table.columns)) if chosen_torque and _address(table, at) == chosen_torque.column
@@ -381,7 +396,7 @@ def _constant(table: Table, filename: str, asked: Reading, channel: str) -> str 
     """Where a channel's value stands that no column holds: in the titles of columns, in the names of the file's parts or
     above them, or in the file's name."""
     within = [value_of_column(column, channel) for column in table.columns]
-    if len({held[0] for held in within if held}) > 1:
+    if any(within):
         return COLUMNS
     if asked.reads_all() and value_of_part(table.name, (table.heads or [table.above])[0], channel) is not None:
         return SHEETS

@@ -6,7 +6,7 @@ name over several columns may stand there too.
 """
 
 import re
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise, zip_longest
 from typing import Any
@@ -123,19 +123,17 @@ class DataRows:
         if self._labelled:
             self._leave_out(self._labelled, "above the first row of")
 
-    def of(
-        self, rows: Iterable[tuple[int, Row]], before: int, *, last: bool, comments: Collection[int] = ()
-    ) -> tuple[list[int], list[Any]]:
-        """Numbers and cells of those of the next rows that are data; `before` were found already, `last`: none follow;
-        `comments`: numbers of those that are no data, but may say what a block is.
+    def of(self, rows: Iterable[tuple[int, Row, bool]], before: int, *, last: bool) -> tuple[list[int], list[Any]]:
+        """Numbers and cells of those of the next rows that are data; `before` were found already, `last`: none follow.
+        With each stands whether it is a comment, which is no data, but may say what a block is.
 
         Raises InvalidError on a row of other titles or other units.
         """
         data_rows: list[tuple[int, Row]] = []
-        for number, row in rows:
+        for number, row, comment in rows:
             if row == self.titles:
                 self._titles_again = True
-            elif number in comments:
+            elif comment:
                 self._comments.append(row)
             elif is_blank(row) or tuple(row) in self._above:
                 continue
@@ -286,6 +284,8 @@ def _with_definitions(rows: Sequence[Row]) -> Sequence[Row]:
     defined: dict[str, str] = {}
     for row in rows:
         channel, *cells = map(_text, row if len(row) > 2 and not is_value(row[0]) else [""])
+        if sum(cell in defined for cell in cells) > 1:
+            continue  # the titles themselves, which name the channels
         unit = next((cell for cell in reversed(cells) if is_unit(cell)), "")
         name = next((cell for cell in cells if cell and known_channel(cell[:LONGEST_TITLE]) and not is_unit(cell)), "")
         if channel and name and unit and not known_channel(channel[:LONGEST_TITLE]):
@@ -468,13 +468,19 @@ def _text_rows_above(rows: Sequence[Row], comments: frozenset[int], start: int) 
     text_rows: list[int] = []
     for index in range(start - 1, -1, -1):
         row = rows[index]
-        if index in comments or not _has_values(row):
+        if index in comments or not _has_values(row) or _names_levels(row, rows[start]):
             text_rows += [] if is_blank(row) else [index]
         elif not is_footer(row, rows[start]) and not _numbers_columns(row, rows[start]):
             break
         if len(text_rows) == _MAX_TITLE_ROWS:
             break
     return text_rows
+
+
+def _names_levels(row: Row, below: Row) -> bool:
+    """Whether a row over numbers has several values with their units, and no other numbers: `;4 bar;5 bar`."""
+    values = [bool(with_unit_apart(cell)[1]) for cell in row if cell not in (None, "") and is_value(cell)]
+    return len(values) > 1 and all(values) and not any(with_unit_apart(cell)[1] for cell in below)
 
 
 def _titles(rows: Sequence[Row], upwards: Sequence[int], width: int, data: Sequence[Row]) -> Iterator[list[str]]:
@@ -495,11 +501,18 @@ def _titles(rows: Sequence[Row], upwards: Sequence[int], width: int, data: Seque
         size = max(len(titles_row), min(len(above), width))
         padded = titles_row + [""] * (size - len(titles_row))
         above += [""] * (size - len(above))
-        yield [name or other for name, other in zip(padded, above, strict=False)]
+        yield [_of_both(name, other) for name, other in zip(padded, above, strict=False)]
         yield [
             name if other == name else f"{other} {name}".strip()
             for name, other in zip(padded, _filled(above, size), strict=False)
         ]
+
+
+def _of_both(name: str, above: str) -> str:
+    """A title of two cells: the one above where `name` is empty or its unit."""
+    if not above or is_unit(above) or not (is_unit(bare_unit(name) or "") or not name):
+        return name or above
+    return f"{above} [{bare_unit(name)}]" if name and not _BRACKETS.search(above) else above
 
 
 def _have_names(rows: Sequence[Row], titles: Sequence[str]) -> bool:

@@ -536,10 +536,8 @@ class _DataBody:
             self._lines.append((self.rows, rows_read))
             even = [cells[index : -1 : self._width + 1] for index in channels]
             return self._numerals.values(channels, even, self.line_of, self.rows)
-        parsed = [(self._line + at, cells, comment) for at, cells, comment in self._parsed(block)]
-        comments = {number for number, _, comment in parsed if comment}
-        readings = ((number, cells) for number, cells, _ in parsed)
-        lines, rows = self.data.of(readings, self.rows, last=last, comments=comments)
+        readings = ((self._line + at, cells, comment) for at, cells, comment in self._parsed(block))
+        lines, rows = self.data.of(readings, self.rows, last=last)
         self._lines.append((self.rows, lines))
         errors = [
             self._ragged(self.rows + row, cells)

@@ -97,7 +97,7 @@ def _table(
 ) -> Table:
     limits.require_columns(len(layout.headings))
     data = DataRows(rows, layout)
-    shown = ((at + 1, rows[at]) for at in range(layout.start, len(rows)) if at not in hidden)
+    shown = ((at + 1, rows[at], False) for at in range(layout.start, len(rows)) if at not in hidden)
     lines, cells = data.of(shown, 0, last=True)
     data.end()
     out = [at + 1 for at in sorted(hidden) if layout.start <= at < len(rows)]

@@ -76,6 +76,12 @@ def test_of_two_pressures_that_is_suggested_by_which_the_torque_goes(tmp_path: P
     assert suggested(tmp_path / "a.csv").map["pressure_bar"] == "p2"
 
 
+def test_of_several_speeds_that_between_both_sides_is_suggested(tmp_path: Path) -> None:
+    titles = "p [bar];Input speed [rpm];Output speed [rpm];Slip speed [rpm];M [Nm]\n"
+    (tmp_path / "a.csv").write_text(titles + rows(P, [n + 300 for n in N], [300] * 12, N, M))
+    assert same(tmp_path / "a.csv").map["speed_rpm"] == "Slip speed"
+
+
 @pytest.mark.parametrize("title", ["Torque per face [Nm]", "Moment je Reibfläche [Nm]", "Torque/face [Nm]"])
 def test_a_torque_of_a_face_is_none_of_the_clutch(tmp_path: Path, title: str) -> None:
     assert refused(tmp_path, f"p [bar];n [1/min];{title}\n" + rows(P, N, M), "needs torque_nm|no channel") is None
@@ -124,6 +130,7 @@ LEVEL = slice(4, 8)
         ("pressure_bar", 14.5038),
         ("pressure_bar", 0.1),
         ("torque_nm", 1e-3),
+        ("torque_nm", 0.737562),
         ("speed_rpm", np.pi / 30),
     ],
 )
@@ -136,7 +143,6 @@ def test_a_level_in_another_unit_is_asked_about(tmp_path: Path, channel: str, fa
 
 
 MISPLACED = [(channel, factor, row) for channel in STACKED for factor in (10, 0.1) for row in (0, 5, 11)]
-MISPLACED.remove(("speed_rpm", 0.1, 5))  # 12 rpm for 120, beside 20 rpm at the other pressures
 
 
 @pytest.mark.parametrize(("channel", "factor", "row"), MISPLACED)
@@ -211,6 +217,25 @@ def test_a_list_of_channels_above_names_the_columns(tmp_path: Path) -> None:
     text = "CH,Signal,Range,Unit\nCH1,Pressure,10V,bar\nCH2,Speed,10V,rpm\nCH3,Torque,5V,Nm\n\nNo,CH1,CH2,CH3\n"
     (tmp_path / "a.csv").write_text(text + rows(NUMBERED, P, N, M, separator=","))
     assert read_file(tmp_path / "a.csv", filename="a.csv").columns["speed_rpm"].tolist() == N
+
+
+LOGGED = [f"2026/11/03 23:59:{57 + k // 2}" if k < 6 else f"2026/11/04 00:00:0{k // 2 - 3}" for k in range(12)]
+RECORDERS = {
+    "a list of channels, and units among titles": (
+        "CH1,Pressure,DC,10V,bar\nCH2,Speed,DC,10V,rpm\nCH3,Torque,DC,5V,Nm\nNumber,Date&Time,ms,CH1,CH2,CH3\n"
+        "NO.,Time,ms,bar,rpm,Nm\n"
+    ),
+    "names above units, titles among the units": "Tag,,,Pressure,Speed,Torque\nNo,Date,ms,bar,rpm,Nm\n",
+}
+
+
+@pytest.mark.parametrize("titles", RECORDERS.values(), ids=RECORDERS)
+def test_titles_and_units_in_one_row_are_told_apart(tmp_path: Path, titles: str) -> None:
+    """As loggers of Graphtec and Yokogawa write them: the number of a row is no millisecond."""
+    (tmp_path / "a.csv").write_text(titles + rows(NUMBERED, LOGGED, [0, 500] * 6, P, N, M, separator=","))
+    columns = read_file(tmp_path / "a.csv", filename="a.csv").columns
+    assert [columns[name].tolist() for name in STACKED] == [P, N, M]
+    assert columns["time_s"].tolist() == [k / 2 for k in range(12)]
 
 
 def test_a_title_of_numbers_that_is_a_sharp_begins_no_comment(tmp_path: Path) -> None:

@@ -265,6 +265,7 @@ MATRICES = {
     "units above": ("Reibmoment in Nm\n;Druck in bar;;\nDrehzahl in 1/min;2;4;6\n", STACKED),
     "units in the titles": ("Friction torque [Nm]\nSpeed [rpm];2 bar;4 bar;6 bar\n", STACKED),
     "both in the corner": ("M [Nm]\nn [1/min] \\ p [bar];2,0;4,0;6,0\n", STACKED),
+    "units below the pressures": ("Reibmoment in Nm\n;2 bar;4 bar;6 bar\nn [1/min];;;\n", STACKED),
     "p = in the titles": ("Torque (Nm) vs speed\nn (rpm);p=2bar;p=4bar;p=6bar\n", STACKED),
     "in kPa": ("Friction torque Nm;Clutch pressure kPa;;\nSpeed rpm;200;400;600\n", STACKED),
 }
@@ -277,6 +278,20 @@ def test_speeds_down_and_pressures_across(tmp_path: Path, above: str, expected: 
     suggestion = same(path, expected)
     assert suggestion.map["torque_nm"].startswith("=cells")
     assert suggestion.map["pressure_bar"].startswith("=columns")
+
+
+@pytest.mark.parametrize("unit", ["1/min", "[rpm]"])
+def test_groups_of_a_pressure_each(tmp_path: Path, unit: str) -> None:
+    """Pressures in merged cells over a torque and a temperature each; the speed's title stands beside them."""
+    columns = [own for torques in TORQUES.values() for own in (torques, [80.5] * 4)]
+    head = "Drehzahl;" + ";".join(f"{p:g} bar;" for p in TORQUES) + f"\n{unit}" + ";M [Nm];T [°C]" * 3 + "\n"
+    (tmp_path / "a.csv").write_text(head + rows(SPEEDS, *columns))
+    assert same(tmp_path / "a.csv").map["pressure_bar"] == "=columns"
+
+
+def test_the_only_pressure_stands_in_a_title(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("n [rpm];M @ 2 bar [Nm]\n" + rows(SPEEDS, TORQUES[2.0]))
+    same(tmp_path / "a.csv", {name: values[:4] for name, values in STACKED.items()})
 
 
 def test_pressures_down_and_speeds_across(tmp_path: Path) -> None:

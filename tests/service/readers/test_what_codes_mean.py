@@ -39,7 +39,7 @@ def test_rows_are_left_out_by_words_by_codes_of_a_format_and_by_flags_whose_titl
 @pytest.mark.parametrize(
     ("title", "of_good", "of_bad"),
     [("Quality", 0, 1), ("Quality", 1, 0), ("Datenqualität", "A", "B"), ("Quality", "true", "false"), ("Quality", "", "x"),
-     ("Quality", 192, 300)],
+     ("Quality", 192, 300), ("Status", "OK", "sensor_fault"), ("Zustand", "ok", "Rampe")],
 )  # fmt: skip
 def test_a_code_of_unknown_meaning_is_asked_for(tmp_path: Path, title: str, of_good: object, of_bad: object) -> None:
     text = marked(title, of_good, of_bad)
