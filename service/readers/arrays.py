@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from models.arrays import FloatArray
 from service.errors import InvalidError, Notice
 from service.readers.column_names import column_of, recognised
-from service.readers.constants import VALUE_NAMES, in_parts
+from service.readers.constants import VALUE_NAMES, in_parts, refuse_several_tests
 from service.readers.limits import Limits
 from service.readers.meanings import known_channel
 from service.readers.numerals import Stamps, is_stamp
@@ -97,8 +97,7 @@ def table_of(tree: Tree, reading: Reading, limits: Limits, unread: tuple[str, ..
     if reading.table:
         name = groups[index_of_wanted(groups, reading.table, "group")]
         return table(of_groups[name], name)
-    if len(knowing := _complete(sources)) > 1:
-        index_of_wanted(knowing, "", "group")
+    refuse_several_tests([source.column for source in sources])
     return table(sources, "")
 
 
@@ -121,14 +120,6 @@ def _paired(tree: Tree) -> Tree:
         if isinstance(value, Leaf) and kind.lower() in VALUE_NAMES and header_values:
             paired[base] = {**header_values[0], kind: paired.pop(key)}
     return paired
-
-
-def _complete(sources: list[_Source]) -> list[str]:
-    """The groups that each hold a torque, a speed and a pressure, so that each is a test of its own."""
-    channels_by_group: dict[str, set[str | None]] = {}
-    for source in sources:
-        channels_by_group.setdefault(source.column.group, set()).add(known_channel(source.column.name))
-    return [group for group, names in channels_by_group.items() if {"torque_nm", "speed_rpm", "pressure_bar"} <= names]
 
 
 def _sources(tree: Tree, group: str, depth: int, above: Tree, stamps: Stamps) -> Iterator[_Source]:

@@ -28,6 +28,7 @@ from service.readers.table import (
     FileColumn,
     Reading,
     Table,
+    index_of_wanted,
     is_per_column,
     labels,
 )
@@ -132,6 +133,16 @@ def in_parts(tables: Sequence[Table]) -> Table:
         notice = Notice(code="parts_left_out", message=f"left out, because other columns stand in it: {out}")
         parts[0] = replace(parts[0], notices=[*parts[0].notices, notice])
     return replace(parts[0], parts=tuple(parts))
+
+
+def refuse_several_tests(columns: Sequence[FileColumn]) -> None:
+    """Raise InvalidError if several groups each hold a torque, a speed and a pressure, so that each is a test of its own."""
+    held: dict[str, set[str | None]] = {}
+    for column in columns:
+        held.setdefault(column.group, set()).add(known_channel(column.name))
+    tests = [group for group, channels in held.items() if channels >= _NEEDED]
+    if len(tests) > 1:
+        index_of_wanted(tests, "", "group")
 
 
 def beside_each_other(tables: Sequence[Table]) -> Table | None:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from models.arrays import FloatArray
 from service.errors import MAX_QUOTED, InvalidError, Notice
 from service.readers.column_names import choices_of, column_of
+from service.readers.constants import refuse_several_tests
 from service.readers.limits import Limits
 from service.readers.stated_clocks import in_seconds
 from service.readers.table import Clock, FileColumn, Reading, Table, cut_short
@@ -53,6 +54,7 @@ def read_table(path: Path, reading: Reading, limits: Limits) -> Table:
         notices.append(Notice(code="not_finalised", message=message))
     several = len({group for group, _ in places}) > 1
     columns = tuple(_column(file, group, index, several, clocks) for group, index in places)
+    refuse_several_tests(columns)
     names = tuple(dict.fromkeys(_name(file, group) for group, _ in places))
     return Table(columns=columns, read=read, name=reading.table, others=names, notices=tuple(notices))
 

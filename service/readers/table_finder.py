@@ -81,13 +81,17 @@ class Layout:
         return self.score[0] + self.score[1], *self.score
 
     def columns(self) -> tuple[FileColumn, ...]:
-        """The columns. Raises InvalidError on a title that is too long, or beside whose unit another is stated."""
-        return tuple(
-            column_of(title, group=group, moments=True)
-            if _is_moment(cell) or _is_word(title, cell)
-            else with_unit(column_of(title, unit, group), with_unit_apart(cell)[1])
-            for title, unit, group, cell in self.headings
-        )
+        """The columns; times without a title have their number for one. Raises InvalidError on a title that is too long, or
+        beside whose unit another is stated."""
+        columns = []
+        for number, (title, unit, group, cell) in enumerate(self.headings, 1):
+            moment, cell_unit = _is_moment(cell), with_unit_apart(cell)[1]
+            name = title or f"column {number}" * (moment or bool(cell_unit))
+            if moment or _is_word(title, cell):
+                columns.append(column_of(name, group=group, moments=True))
+            else:
+                columns.append(with_unit(column_of(name, unit, group), cell_unit))
+        return tuple(columns)
 
 
 class DataRows:

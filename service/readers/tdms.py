@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from service.errors import MAX_QUOTED, InvalidError
 from service.readers.arrays import refuse_counts, unit_of_array
 from service.readers.column_names import column_of
-from service.readers.constants import in_parts
+from service.readers.constants import in_parts, refuse_several_tests
 from service.readers.limits import Limits
 from service.readers.numerals import Stamps, is_stamp
 from service.readers.stated_clocks import evenly, in_seconds, stated_clock
@@ -41,7 +41,9 @@ def read_table(path: Path, reading: Reading, limits: Limits) -> Table:
         return in_parts([_table(file, [group], group.name, limits) for group in groups])
     if reading.table:
         groups = [groups[index_of_wanted([group.name for group in groups], reading.table, "group")]]
-    return _table(file, groups, reading.table, limits)
+    table = _table(file, groups, reading.table, limits)
+    refuse_several_tests(table.columns)
+    return table
 
 
 def _table(file: Any, groups: Sequence[Any], name: str, limits: Limits) -> Table:

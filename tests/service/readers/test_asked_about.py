@@ -238,6 +238,13 @@ def test_titles_and_units_in_one_row_are_told_apart(tmp_path: Path, titles: str)
     assert columns["time_s"].tolist() == [k / 2 for k in range(12)]
 
 
+@pytest.mark.parametrize("cell", ["{:.1f}s", "2026-11-03 09:12:{:04.1f}"], ids=["PicoLog", "pandas"])
+def test_times_without_a_title_are_suggested_by_their_number(tmp_path: Path, cell: str) -> None:
+    (tmp_path / "a.csv").write_text(";" + TITLES + rows([cell.format(k / 2) for k in range(12)], P, N, M))
+    expected = STACKED | {"time_s": np.arange(12) / 2}
+    assert same(tmp_path / "a.csv", expected, "dynamic_stribeck").map["time_s"] == "column 1"
+
+
 def test_a_title_of_numbers_that_is_a_sharp_begins_no_comment(tmp_path: Path) -> None:
     (tmp_path / "a.tsv").write_text("#\tp (bar)\tn (rpm)\tM (Nm)\n" + rows(NUMBERED, P, N, M, separator="\t"))
     assert read_file(tmp_path / "a.tsv", filename="a.tsv").columns["torque_nm"].tolist() == M

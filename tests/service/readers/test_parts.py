@@ -141,6 +141,13 @@ def test_sheets_of_the_same_levels_are_tests_of_their_own(tmp_path: Path) -> Non
     assert (suggestion.table, suggestion.confidence) == ("before", 0.5)
 
 
+def test_groups_of_the_same_levels_are_tests_of_their_own(tmp_path: Path) -> None:
+    with TdmsWriter(str(tmp_path / "a.tdms")) as file:
+        channels = [(group, name, values) for group in ("after", "before") for name, values in STACKED.items()]
+        file.write_segment([ChannelObject(*channel) for channel in channels])
+    assert (same(tmp_path / "a.tdms").table, suggested(tmp_path / "a.tdms").confidence) == ("after", 0.5)
+
+
 BY_SPEED = {speed: [torques[at] for torques in TORQUES.values()] for at, speed in enumerate(SPEEDS)}
 
 
