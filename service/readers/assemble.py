@@ -28,9 +28,9 @@ from service.readers.column_names import (
     perhaps_the_time,
     several_times,
 )
-from service.readers.constants import constants, stacked_columns, stated_step, with_constants
+from service.readers.constants import constants, stated_step
 from service.readers.limits import Limits
-from service.readers.long_table import says_valid, valid_rows, widened
+from service.readers.long_table import in_columns, says_valid, valid_rows
 from service.readers.meanings import known_channel
 from service.readers.missing_values import (
     drop_totals,
@@ -97,7 +97,7 @@ def to_channels(table: Table, reading: Reading, limits: Limits) -> Channels:
     """
     if table.parts:
         return below_each_other([to_channels(replace(part, parts=()), reading, limits) for part in table.parts])
-    table, reading = widened(stacked_columns(with_constants(table, reading), reading), reading)
+    table, reading = in_columns(table, reading)
     constant, step = constants(table, reading), stated_step(table, reading)
     chosen = choose(table.columns, reading)
     series, table, counts = _read(table, chosen, reading, limits)
@@ -259,13 +259,13 @@ def _repeats(times: FloatArray) -> bool:
 def _refuse_passed_over(column: FileColumn, seconds: FloatArray, clocks: Mapping[int, Clock | None]) -> None:
     """Raise InvalidError if an unused column may be a time: it runs on and there is no other clock, or it runs like a
     used clock and begins within its record at another time, so that it may belong to a channel."""
-    if not any(clocks.values()) and runs_on(seconds):
+    if not any(clocks.values()) and runs_on(column, seconds):
         raise perhaps_the_time(column)
     all_used = [clock.read() for clock in {id(own): own for own in clocks.values() if own is not None}.values()]
     if any(np.array_equal(used, seconds) for used in all_used):
         return  # the array of one of these clocks
     for used in all_used:
-        if used.size != seconds.size or used.size < 2 or not runs_on(seconds):
+        if used.size != seconds.size or used.size < 2 or not runs_on(column, seconds):
             continue
         shift = abs(float(seconds[0] - used[0]))
         if _agree(seconds, used) and _step(used) / 2 < shift < float(np.ptp(used)):
@@ -289,11 +289,12 @@ def _agree(times: FloatArray, others: FloatArray) -> bool:
     return bool(max_difference <= max(steps) * (1 + 1e-9))
 
 
-def runs_on(times: FloatArray) -> bool:
-    """Whether a column may be a clock: nine of ten of its steps are forward. Chosen: of durations in any order half
-    are."""
+def runs_on(column: FileColumn, times: FloatArray) -> bool:
+    """Whether a column may be a clock: nine of ten of its steps are forward, and without a title not all of them 1, as those
+    of row numbers are. Chosen: of durations in any order half are."""
     steps = np.diff(times[~np.isnan(times)])
-    return bool(steps.size > 0 and np.count_nonzero(steps > 0) >= _MOST_OF * steps.size)
+    forward = np.count_nonzero(steps > 0) >= _MOST_OF * steps.size
+    return bool(steps.size > 0 and forward and (column.title or not (steps == 1).all()))
 
 
 def _add_part(times: FloatArray, parts: Mapping[int, FloatArray]) -> int | None:
@@ -477,7 +478,7 @@ def _left_out(columns: Mapping[int, FileColumn], taken: Sequence[Taken], reading
     """Notices about columns of the table that are not used."""
     notices = []
     used = {column.index for column in taken}
-    others = [column for index, column in columns.items() if index not in used and (column.title or column.name)]
+    others = [column for index, column in columns.items() if index not in used and column.title]
     others = [own for own in others if not {own.title, own.name, f"{own.group}/{own.name}"} & {*reading.left_out}]
     if reading.time == NO_TIME:
         others = [column for column in others if known_channel(column.name) != "time_s"]

@@ -324,11 +324,13 @@ def may_be_time(column: FileColumn) -> bool:
 
 
 def like_a_time(column: FileColumn) -> bool:
-    """Whether a column may be the clock by its unit, by a word of another language, or by a part of its name."""
+    """Whether a column may be the clock by its unit, by a word of another language, by a part of its name, or because it
+    has no title."""
     channel, sense = meaning(column.name, column.unit)
     if column.unit is None and channel is None:
         channel, sense = meaning(column.name, "s")
-    return may_be_time(column) or (channel == "time_s" and sense is not Sense.WHOLE)
+    untitled = bool(column.name) and not column.title
+    return untitled or may_be_time(column) or (channel == "time_s" and sense is not Sense.WHOLE)
 
 
 def no_unit(columns: Sequence[tuple[str, FileColumn]], reading: Reading) -> InvalidError:

@@ -24,6 +24,7 @@ from service.readers.column_names import (
     recognised,
     several_times,
 )
+from service.readers.constants import stacked_columns, with_constants
 from service.readers.limits import LIMITS
 from service.readers.meanings import Sense, known_channel, meaning
 from service.readers.numerals import NUMBER, plain, read_cells
@@ -35,7 +36,13 @@ from service.readers.unit_table import is_unit
 _MAX_LOOKED_AT = 20
 _VALUES = re.compile(r"val(?!id)|wert|reading|messung|数值|値|^y$", re.IGNORECASE)
 #: A column that says which values are valid, of one whose title says what its flag means; and words for good and bad ones.
-_QUALITY, _STATUS = (re.compile(names, re.IGNORECASE) for names in ("valid|qualit|gültig", "status|zustand"))
+_QUALITY, _STATUS = (
+    re.compile(names, re.IGNORECASE)
+    for names in (
+        "valid|qualit|gültig|outlier|ausrei(?:ss|ß)er",
+        r"status|zustand|bemerkung|kommentar|comment|remark|\bnotes?\b|notiz",
+    )
+)
 _VALID, _INVALID = (re.compile(names, re.IGNORECASE) for names in ("valid|gültig", "invalid|ungültig"))
 _GOOD = {"good", "ok", "valid", "gut", "gültig", "i.o.", "io", "pass", "passed"}
 _BAD = {"bad", "nok", "invalid", "schlecht", "ungültig", "n.i.o.", "nio", "uncertain"} | {
@@ -96,16 +103,22 @@ def _code(word: str) -> str | float:
 
 
 def _which_is_good(column: FileColumn, codes: NDArray[Any]) -> InvalidError:
-    counts = {
-        f"{code:g}" if isinstance(code, float) else code or "empty": count for code, count in Counter(codes).items()
-    }
+    """The question for the good codes, with a suggestion: those that no word calls bad, else the most frequent."""
+    counts = Counter(f"{code:g}" if isinstance(code, float) else code or "empty" for code in codes.tolist())
     shown = ", ".join(f"{code} in {count} rows" for code, count in counts.items())
-    first, *_ = counts
+    not_bad = [code for code in counts if _BAD.isdisjoint(code.split())]
+    good = ",".join(not_bad) if len(not_bad) < len(counts) else max(counts, key=lambda code: counts[code])
     message = (
-        f"column {column.shown()} holds {shown}: which of them is good? Add good={first}, or whichever it is, to leave the "
+        f"column {column.shown()} holds {shown}: which of them is good? Add good={good}, or whichever it is, to leave the "
         f"other rows out; good={NO_MISSING} reads all rows"
     )
-    return InvalidError.of(message, code="which_is_good", pointer="/good", value=column.shown())
+    return InvalidError.of(message, code="which_is_good", pointer="/good", value=good)
+
+
+def in_columns(table: Table, reading: Reading) -> tuple[Table, Reading]:
+    """The table with a column for each quantity, and the reading for it: constants of parts beside the columns, values of
+    titles below each other, names in cells as columns. Raises InvalidError as each step does."""
+    return widened(stacked_columns(with_constants(table, reading), reading), reading)
 
 
 def widened(table: Table, reading: Reading) -> tuple[Table, Reading]:

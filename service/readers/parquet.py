@@ -22,6 +22,9 @@ from service.readers.meanings import known_channel
 from service.readers.numerals import is_stamp
 from service.readers.table import FileColumn, Reading, Table
 
+#: The name by which pandas writes an index that has none.
+_INDEX = "__index_level_"
+
 
 def read_table(path: Path, _: Reading, limits: Limits) -> Table:
     """The columns of the file. A null is NaN, which is refused."""
@@ -58,7 +61,8 @@ def _column(field: Any, file: Any, beside: Mapping[str, Any]) -> FileColumn:
     if known_channel(field.name) == "time_s" and kinds.is_large_string(field.type) | kinds.is_string(field.type):
         moment = any(is_stamp(str(batch[0][0])) for batch in islice(file.iter_batches(1, columns=[field.name]), 1))
     unit = unit_of_array(_stated(field.metadata)) or stated_unit(field.name, beside)
-    return replace(column_of(field.name, unit, moments=moment), rows=file.metadata.num_rows)
+    column = replace(column_of(field.name, unit, moments=moment), rows=file.metadata.num_rows)
+    return replace(column, title="") if field.name.startswith(_INDEX) else column
 
 
 def _values(column: Any) -> NDArray[Any]:

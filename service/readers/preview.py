@@ -4,8 +4,8 @@ from typing import TypedDict
 
 from service.errors import MAX_QUOTED, InvalidError
 from service.readers.column_names import choices_of, column_of, understood
-from service.readers.constants import constants, stacked_columns, with_constants
-from service.readers.long_table import widened
+from service.readers.constants import constants
+from service.readers.long_table import in_columns
 from service.readers.table import Reading, Table, labels
 
 #: Lines above the table that are shown. Chosen: a screenful.
@@ -42,7 +42,7 @@ class ShownTable(TypedDict):
 def preview(table: Table, reading: Reading) -> ShownTable:
     """The preview of a table and its columns, even if they cannot be read."""
     try:
-        table, reading = widened(stacked_columns(with_constants(table, reading), reading), reading)
+        table, reading = in_columns(table, reading)
         constants(table, reading)
         chosen, errors = understood(table.columns, reading)
     except InvalidError as error:

@@ -14,13 +14,13 @@ from typing import Any
 from service.channels import CHANNELS
 from service.errors import MAX_QUOTED, InvalidError, Notice
 from service.readers import sandbox
-from service.readers.assemble import Channels, below_each_other, to_channels
+from service.readers.assemble import Channels, below_each_other
 from service.readers.column_names import parse_map
 from service.readers.constants import beside_each_other, value_of_part
 from service.readers.detect import Format, members, opened, sniff, unpacked
 from service.readers.limits import LIMITS, Limits
-from service.readers.preview import ShownTable, preview
-from service.readers.suggest import Proposal, propose
+from service.readers.preview import ShownTable
+from service.readers.suggest import Proposal
 from service.readers.table import ALL, SHEETS, ColumnChoice, Reading, Table, index_of_wanted
 from service.readers.text import read_text
 
@@ -66,16 +66,7 @@ def _read(path: Path, filename: str, reading: Reading, limits: Limits, answer: s
     if kind is not Format.TEXT:
         return sandbox.read_isolated(kind, path, answer, reading=reading, limits=limits, filename=filename)
     text = partial(read_text, partial(opened, path, limits), limits=limits, any_encoding=answer == "suggestion")
-    return _answered(text, reading, limits, answer, filename)
-
-
-def _answered(
-    read_table: Callable[[Reading], Table], reading: Reading, limits: Limits, answer: sandbox.Answer, filename: str
-) -> Any:
-    if answer == "suggestion":
-        return propose(read_table, reading, limits, filename)
-    table = read_table(reading)
-    return preview(table, reading) if answer == "preview" else to_channels(table, reading, limits)
+    return sandbox.answered(text, reading, limits, answer, filename)
 
 
 def _in_archive(path: Path, reading: Reading, limits: Limits, answer: sandbox.Answer) -> Any:
@@ -103,7 +94,7 @@ def _in_archive(path: Path, reading: Reading, limits: Limits, answer: sandbox.An
     if not reading.table:
         with ExitStack() as stack:
             if (beside := _beside(path, names, reading, limits, stack)) is not None:
-                return _answered(lambda _: beside, reading, limits, answer, "")
+                return sandbox.answered(lambda _: beside, reading, limits, answer, "")
     records: dict[str, Any] = {}
     refused: list[InvalidError] = []
     for name in names[:_MAX_TRIED]:

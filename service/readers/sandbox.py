@@ -17,7 +17,7 @@ import signal
 import socket
 import sys
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from functools import lru_cache, partial
 from importlib.util import find_spec
@@ -35,7 +35,7 @@ from service.readers.column_names import column_of
 from service.readers.confinement import close_files, close_network_and_processes
 from service.readers.detect import Format, is_packed, opened, overdue, too_slow
 from service.readers.limits import LIMITS, Limits
-from service.readers.preview import preview
+from service.readers.preview import ShownTable, preview
 from service.readers.suggest import Proposal, propose
 from service.readers.table import ColumnChoice, Reading, Table
 
@@ -86,6 +86,16 @@ def read_isolated(
             plain.write(block)
         plain.flush()
         return _run(kind, Path(plain.name), answer, reading, limits, filename)
+
+
+def answered(
+    read_table: Callable[[Reading], Table], reading: Reading, limits: Limits, answer: Answer, filename: str
+) -> Channels | Proposal | ShownTable | None:
+    """What is asked of a table, which `read_table` reads. Raises as reading does."""
+    if answer == "suggestion":
+        return propose(read_table, reading, limits, filename)
+    table = read_table(reading)
+    return preview(table, reading) if answer == "preview" else to_channels(table, reading, limits)
 
 
 def not_installed(kind: Format, consequence: str) -> str | None:
@@ -242,13 +252,11 @@ def _read(request: Mapping[str, Any], answer: int) -> None:
         result.flush()
         try:
             read_table = partial(reader.read_table, path, limits=limits)
-            if request["answer"] == "suggestion":
-                proposed = propose(read_table, reading, limits, request["filename"])
-                _write(result, {"suggestion": proposed and asdict(proposed)})
-            elif request["answer"] == "preview":
-                _write(result, {"preview": preview(read_table(reading), reading)})
+            said = answered(read_table, reading, limits, request["answer"], request["filename"])
+            if isinstance(said, Channels):
+                _write_channels(result, said)
             else:
-                _write_channels(result, to_channels(read_table(reading), reading, limits))
+                _write(result, {request["answer"]: asdict(said) if isinstance(said, Proposal) else said})
         except ServiceError as error:
             _write_error(result, error)
         except MemoryError:

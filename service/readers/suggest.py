@@ -18,15 +18,9 @@ from service.channels import CHANNELS
 from service.errors import FieldError, InvalidError
 from service.readers.assemble import as_seconds, runs_on, to_channels
 from service.readers.column_names import choices_of, column_of, like_a_time
-from service.readers.constants import (
-    stacked_columns,
-    value_of_column,
-    value_of_part,
-    value_within,
-    with_constants,
-)
+from service.readers.constants import value_of_column, value_of_part, value_within
 from service.readers.limits import LONGEST_TITLE, Limits
-from service.readers.long_table import widened
+from service.readers.long_table import in_columns
 from service.readers.meanings import (
     MEANS,
     SLIDING,
@@ -144,8 +138,8 @@ def _attempt(
 
 def _titles(table: Table, reading: Reading) -> tuple[str, ...]:
     """All columns by their names in a profile."""
-    wide, _ = widened(stacked_columns(with_constants(table, reading), reading), reading)
-    return tuple(dict.fromkeys(_title(own) for own in wide.columns if own.name and not own.name.startswith("=")))
+    wide, _ = in_columns(table, reading)
+    return tuple(dict.fromkeys(_title(own) for own in wide.columns if own.title and not own.name.startswith("=")))
 
 
 # --- columns ---
@@ -155,8 +149,7 @@ def _named(table: Table, asked: Reading, filename: str, *, clock: bool) -> tuple
     """The reading with a column for each channel that has one, and its confidence; `clock`: also one of several times."""
     if (crossed := _crossed(table, asked)) is not None:
         return crossed
-    stacked = stacked_columns(with_constants(table, asked), asked)
-    wide, wide_reading = widened(stacked, asked)
+    wide, wide_reading = in_columns(table, asked)
     mapping, confidence = dict(asked.mapping), 1.0
     least = 1.0 if {*_NEEDED} <= mapping.keys() else 0.0  # a caller who named them all wants no other guess
     given = {choice.column for choice in choices_of(asked).values()}
@@ -180,7 +173,7 @@ def _named(table: Table, asked: Reading, filename: str, *, clock: bool) -> tuple
                 named, sure = _named(table, only, filename, clock=clock)
                 return named, min(sure, confidence)
     named = replace(asked, mapping=mapping)
-    if wide is not stacked or asked.time or "time_s" in mapping:
+    if wide_reading is not asked or asked.time or "time_s" in mapping:
         return named, confidence
     at, sure = _time(wide, free, wide_reading, needed=clock)
     if at is not None:
@@ -386,7 +379,7 @@ def _time(table: Table, free: Mapping[int, FileColumn], reading: Reading, *, nee
     if not whole and not likely and any(not np.array_equal(read[at], read[of_columns[0]]) for at in of_columns):
         return None, 1.0
     for at in read:
-        if runs_on(as_seconds(free[at], read[at])):
+        if runs_on(free[at], as_seconds(free[at], read[at])):
             of, sense = meaning(free[at].name, free[at].unit)
             scores[at] = _SURE.get(sense, 0.0) if of == "time_s" else _UNIT_ALONE
     return _best(scores)
@@ -442,8 +435,7 @@ def _mended(
     if wrong.code == "ambiguous_number" and not asked.decimal:
         return _sign_chosen(asked, read_table, limits, filename)
     if wrong.code == "which_is_good" and not asked.good:
-        counts = {code: int(rows) for code, rows in re.findall(r"(\S+) in (\d+) rows", detail)}
-        return replace(asked, good=max(counts, key=lambda code: counts[code])), _SIGN
+        return replace(asked, good=wrong.value), _SIGN
     if (unit := _UNIT_NAMED.search(detail)) and unit[2] in asked.mapping:
         choice = replace(asked.mapping[unit[2]], unit=unit[1])
         return replace(asked, mapping={**asked.mapping, unit[2]: choice}), _UNIT_BY_SIZE

@@ -81,16 +81,17 @@ class Layout:
         return self.score[0] + self.score[1], *self.score
 
     def columns(self) -> tuple[FileColumn, ...]:
-        """The columns; times without a title have their number for one. Raises InvalidError on a title that is too long, or
-        beside whose unit another is stated."""
+        """The columns; one of values without a title has its number for a name. Raises InvalidError on a title
+        that is too long, or beside whose unit another is stated."""
         columns = []
         for number, (title, unit, group, cell) in enumerate(self.headings, 1):
             moment, cell_unit = _is_moment(cell), with_unit_apart(cell)[1]
-            name = title or f"column {number}" * (moment or bool(cell_unit))
             if moment or _is_word(title, cell):
-                columns.append(column_of(name, group=group, moments=True))
+                columns.append(column_of(title, group=group, moments=True))
             else:
-                columns.append(with_unit(column_of(name, unit, group), cell_unit))
+                columns.append(with_unit(column_of(title, unit, group), cell_unit))
+            if not title and is_value(cell):
+                columns[-1] = replace(columns[-1], name=f"column {number}")
         return tuple(columns)
 
 

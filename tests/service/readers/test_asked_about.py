@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+import pandas as pd  # type: ignore[import-untyped]
 import pytest
 
 from service.api.rig import Suggestion
@@ -238,11 +239,24 @@ def test_titles_and_units_in_one_row_are_told_apart(tmp_path: Path, titles: str)
     assert columns["time_s"].tolist() == [k / 2 for k in range(12)]
 
 
-@pytest.mark.parametrize("cell", ["{:.1f}s", "2026-11-03 09:12:{:04.1f}"], ids=["PicoLog", "pandas"])
+@pytest.mark.parametrize("cell", ["{:.1f}s", "{:.1f}", "2026-11-03 09:12:{:04.1f}"])
 def test_times_without_a_title_are_suggested_by_their_number(tmp_path: Path, cell: str) -> None:
+    """As PicoLog and pandas write them."""
     (tmp_path / "a.csv").write_text(";" + TITLES + rows([cell.format(k / 2) for k in range(12)], P, N, M))
     expected = STACKED | {"time_s": np.arange(12) / 2}
-    assert same(tmp_path / "a.csv", expected, "dynamic_stribeck").map["time_s"] == "column 1"
+    assert same(tmp_path / "a.csv", expected, "dynamic_stribeck").map["time_s"].startswith("column 1")
+
+
+@pytest.mark.parametrize("step", [0.5, 1])
+def test_an_index_of_pandas_is_asked_about_unless_it_counts_the_rows(tmp_path: Path, step: float) -> None:
+    frame = pd.DataFrame(STACKED, index=np.arange(12) * step)
+    frame.to_parquet(tmp_path / "a.parquet")
+    frame.to_excel(tmp_path / "a.xlsx")
+    for path in (tmp_path / "a.parquet", tmp_path / "a.xlsx"):
+        if step == 1:
+            assert read_file(path, filename=path.name).columns["torque_nm"].tolist() == M
+        else:
+            same(path, STACKED | {"time_s": frame.index.to_numpy()}, "dynamic_stribeck")
 
 
 def test_a_title_of_numbers_that_is_a_sharp_begins_no_comment(tmp_path: Path) -> None:

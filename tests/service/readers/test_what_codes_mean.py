@@ -39,7 +39,7 @@ def test_rows_are_left_out_by_words_by_codes_of_a_format_and_by_flags_whose_titl
 @pytest.mark.parametrize(
     ("title", "of_good", "of_bad"),
     [("Quality", 0, 1), ("Quality", 1, 0), ("Datenqualität", "A", "B"), ("Quality", "true", "false"), ("Quality", "", "x"),
-     ("Quality", 192, 300), ("Status", "OK", "sensor_fault"), ("Zustand", "ok", "Rampe")],
+     ("Quality", 192, 300), ("Status", "OK", "sensor_fault"), ("Zustand", "ok", "Rampe"), ("Ausreißer", "", "x")],
 )  # fmt: skip
 def test_a_code_of_unknown_meaning_is_asked_for(tmp_path: Path, title: str, of_good: object, of_bad: object) -> None:
     text = marked(title, of_good, of_bad)
@@ -48,6 +48,15 @@ def test_a_code_of_unknown_meaning_is_asked_for(tmp_path: Path, title: str, of_g
     assert caught.value.errors[0].code == "which_is_good"
     assert pressures(tmp_path, text, good=str(of_good).strip() or "empty") == [4, 6]
     assert pressures(tmp_path, text, good="none") == [4, 5, 6]
+
+
+@pytest.mark.parametrize("title", ["Bemerkung", "Remark", "Status"])
+def test_a_word_for_bad_rows_among_notes_is_asked_about(tmp_path: Path, title: str) -> None:
+    notes = dict.fromkeys(range(12), "") | {3: "ungültig", 5: "Öl nachgefüllt", 7: "Sensor fault"}
+    text = "\n".join([f"{TITLES},{title}", *(f"{row},{notes[at]}" for at, row in enumerate(ROWS))]) + "\n"
+    with pytest.raises(InvalidError, match="Add good=empty,öl nachgefüllt, or") as caught:
+        pressures(tmp_path, text)
+    assert read_content(tmp_path, text, good=caught.value.errors[0].value).columns["torque_nm"].size == 10
 
 
 @pytest.mark.parametrize("code", [0, 1, 192, "n", "ON"])
