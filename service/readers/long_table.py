@@ -36,11 +36,12 @@ from service.readers.unit_table import is_unit
 _MAX_LOOKED_AT = 20
 _VALUES = re.compile(r"val(?!id)|wert|reading|messung|数值|値|^y$", re.IGNORECASE)
 #: A column that says which values are valid, of one whose title says what its flag means; and words for good and bad ones.
-_QUALITY, _STATUS = (
+_QUALITY, _STATUS, _NOTES = (
     re.compile(names, re.IGNORECASE)
     for names in (
         "valid|qualit|gültig|outlier|ausrei(?:ss|ß)er",
-        r"status|zustand|bemerkung|kommentar|comment|remark|\bnotes?\b|notiz",
+        "status|zustand",
+        r"bemerkung|kommentar|comment|remark|\bnotes?\b|notiz",
     )
 )
 _VALID, _INVALID = (re.compile(names, re.IGNORECASE) for names in ("valid|gültig", "invalid|ungültig"))
@@ -61,7 +62,7 @@ def says_valid(column: FileColumn, reading: Reading) -> bool:
     """Whether a column's title says that it marks valid rows, so that its values are to be checked."""
     if reading.good == NO_MISSING or reading.missing == NO_MISSING:
         return False
-    return _QUALITY.search(column.name) is not None or _STATUS.search(column.name) is not None
+    return any(names.search(column.name) for names in (_QUALITY, _STATUS, _NOTES))
 
 
 def valid_rows(column: FileColumn, cells: NDArray[Any], reading: Reading) -> NDArray[np.bool_] | None:
@@ -74,13 +75,17 @@ def valid_rows(column: FileColumn, cells: NDArray[Any], reading: Reading) -> NDA
     values = set(codes)
     numbers = {value for value in values if isinstance(value, float)}
     good: set[str | float]
+    if _NOTES.search(column.name) and not any(_has_word(value, _BAD) for value in values):
+        return None
     if reading.good:
         good = {"" if word == "empty" else _code(word) for word in marks(reading.good)}
     elif values <= _GOOD | _BAD:
         good = {*_GOOD}
     elif _VALID.search(column.name) and numbers == values and numbers <= {0.0, 1.0}:
         good = {0.0 if _INVALID.search(column.name) else 1.0}
-    elif not 1 < len(values) <= _MOST_CODES or not (_QUALITY.search(column.name) or any(map(_judges, values))):
+    elif not 1 < len(values) <= _MOST_CODES or not (
+        _QUALITY.search(column.name) or any(_has_word(value, _GOOD | _BAD) for value in values)
+    ):
         return None
     elif numbers == values and _DA_GOOD in numbers and max(numbers) <= _DA_MOST:
         good = {number for number in values if number in numbers and float(number) >= _DA_GOOD}
@@ -91,9 +96,9 @@ def valid_rows(column: FileColumn, cells: NDArray[Any], reading: Reading) -> NDA
     return np.array([code in good for code in codes.tolist()])
 
 
-def _judges(code: str | float) -> bool:
-    """Whether a word of a text is one for good or bad rows (`sensor fault`)."""
-    return isinstance(code, str) and not {*code.split()}.isdisjoint(_GOOD | _BAD)
+def _has_word(code: str | float, words: set[str]) -> bool:
+    """Whether a text has one of some words (`sensor fault`)."""
+    return isinstance(code, str) and not words.isdisjoint(code.split())
 
 
 def _code(word: str) -> str | float:
@@ -106,7 +111,7 @@ def _which_is_good(column: FileColumn, codes: NDArray[Any]) -> InvalidError:
     """The question for the good codes, with a suggestion: those that no word calls bad, else the most frequent."""
     counts = Counter(f"{code:g}" if isinstance(code, float) else code or "empty" for code in codes.tolist())
     shown = ", ".join(f"{code} in {count} rows" for code, count in counts.items())
-    not_bad = [code for code in counts if _BAD.isdisjoint(code.split())]
+    not_bad = [code for code in counts if not _has_word(code, _BAD)]
     good = ",".join(not_bad) if len(not_bad) < len(counts) else max(counts, key=lambda code: counts[code])
     message = (
         f"column {column.shown()} holds {shown}: which of them is good? Add good={good}, or whichever it is, to leave the "

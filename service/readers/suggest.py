@@ -33,7 +33,7 @@ from service.readers.meanings import (
     measures,
     words,
 )
-from service.readers.numerals import is_stamp, plain, read_cells, with_unit_apart
+from service.readers.numerals import plain, read_cells, with_unit_apart
 from service.readers.table import ALL, CELLS, COLUMNS, NO_TIME, SHEETS, ColumnChoice, FileColumn, Reading, Table, labels
 from service.readers.table_finder import CORNER, is_value
 from service.readers.unit_table import conversion, is_unit
@@ -199,8 +199,6 @@ def _crossed(table: Table, asked: Reading) -> tuple[Reading, float] | None:
         return None
     under, across = sorted(likely, key=lambda channel: likely[channel], reverse=True)
     in_titles = _all_values(over, across)
-    if not in_titles and not plain_values:
-        return None
     stated = None if in_titles else _unit_among(texts, across)
     mapping = {
         under: ColumnChoice(column=_title(down), unit=None if down.unit else _unit_among(texts, under)),
@@ -280,12 +278,10 @@ def _correlation(values: FloatArray, others: FloatArray) -> float:
 def _address(table: Table, at: int) -> str:
     """A column's name for a map: with its unit, or its number if several columns share the name."""
     column = table.columns[at]
-    name, titles = _title(column), [own.title for own in table.columns]
+    name = _title(column)
     equal = [other for other, own in enumerate(table.columns) if _title(own) == name]
     if len(equal) == 1:
         return name
-    if column.title != name and titles.count(column.title) == 1:
-        return column.title
     units = [table.columns[other].unit for other in equal]
     return (
         f"{name} [{column.unit}]" if column.unit and units.count(column.unit) == 1 else f"{name}#{equal.index(at) + 1}"
@@ -339,8 +335,6 @@ def _choice(table: Table, at: int, channel: str, reading: Reading) -> tuple[Colu
     """A column with its unit, or the unit that its values suggest if it states none; and its confidence."""
     column, title = table.columns[at], _address(table, at)
     if column.unit is not None or column.name == channel:
-        return ColumnChoice(column=title), 1.0
-    if channel == "time_s" and any(is_stamp(row[at]) for row in table.head[:1] if len(row) > at):
         return ColumnChoice(column=title), 1.0
     values = plain(read_cells(table, {at: channel}, reading)[at])
     return ColumnChoice(column=title, unit=_unit_by_size(channel, values)), _UNIT_BY_SIZE

@@ -59,6 +59,11 @@ def test_a_word_for_bad_rows_among_notes_is_asked_about(tmp_path: Path, title: s
     assert read_content(tmp_path, text, good=caught.value.errors[0].value).columns["torque_nm"].size == 10
 
 
+def test_notes_of_no_bad_row_leave_the_status_to_say_which_is_good(tmp_path: Path) -> None:
+    text = marked("Status,Remark", "OK,", "sensor fault,oil topped up")
+    assert pressures(tmp_path, text, good="ok") == [4, 6]
+
+
 @pytest.mark.parametrize("code", [0, 1, 192, "n", "ON"])
 @pytest.mark.parametrize("title", ["Quality", "Status", "Zustand"])
 def test_one_code_in_all_rows_leaves_none_out(tmp_path: Path, title: str, code: object) -> None:
