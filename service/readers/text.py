@@ -454,11 +454,10 @@ class _DataBody:
         start = block.rfind("\n", 0, -1) + 1
         line = block[start:-1]
         cells = _cells(line, self._separator)
-        taken = cells[len(cells) - 1] if len(cells) == max(channels) + 1 else ""
-        above = [
-            row[max(channels)] for row in self._form.rows[self._form.layout.start : -1] if len(row) > max(channels)
-        ]
-        if len(cells) > max(channels) and len(cells) >= self._usual_width and is_whole(taken, above):
+        last = max(channels)
+        taken = cells[last] if len(cells) == last + 1 and (channels[last] or is_value(cells[last])) else ""
+        above = [row[last] for row in self._form.rows[self._form.layout.start : -1] if len(row) > last]
+        if len(cells) > _last_needed(channels) and len(cells) >= self._usual_width and is_whole(taken, above):
             return block
         if not (self.rows or start) or not any(map(is_value, cells)):
             return block  # the only row, or words below the table
@@ -470,13 +469,13 @@ class _DataBody:
 
     def _settle(self, channels: Mapping[int, str]) -> None:
         """Learn the decimal sign from the first unambiguous cell; a full stop if no cell has a sign."""
-        doubtful = quoted = False
+        doubtful, quoted, needed = False, False, _last_needed(channels)
         for block, *_ in self._blocks():
             if self._numerals.decimal:
                 return
             quoted |= '"' in block
             if "." in block or ("," in block and (self._separator != "," or '"' in block)):
-                parsed = (cells for _, cells, _ in self._parsed(block) if len(cells) > max(channels))
+                parsed = (cells for _, cells, _ in self._parsed(block) if len(cells) > needed)
                 while rows := list(islice(parsed, _SETTLED)):
                     shown = [[row[at] for row in rows] for at, name in channels.items() if name]
                     doubtful |= self._numerals.settle(shown)
@@ -555,7 +554,7 @@ class _DataBody:
         that is shorter than most may lack any of its cells, and the last row may be cut."""
         while len(cells) > self._width and not cells[-1]:
             cells.pop()
-        if len(cells) > max(*channels, self._usual_width - 1):
+        if len(cells) > max(_last_needed(channels), self._usual_width - 1):
             cells += [""] * (self._width - len(cells))
         return len(cells) == self._width
 
@@ -565,3 +564,8 @@ class _DataBody:
         if recognised(cells, ()) > 1:
             message += ". If another table begins there, send it in a separate file"
         return FieldError(pointer="", row=row + 1, value=line, code="ragged", message=message)
+
+
+def _last_needed(channels: Mapping[int, str]) -> int:
+    """The last column that a row must have: that of a channel, if any is read; notes may be missing."""
+    return max((at for at, name in channels.items() if name), default=max(channels))

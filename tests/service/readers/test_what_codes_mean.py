@@ -59,6 +59,13 @@ def test_a_word_for_bad_rows_among_notes_is_asked_about(tmp_path: Path, title: s
     assert read_content(tmp_path, text, good=caught.value.errors[0].value).columns["torque_nm"].size == 10
 
 
+@pytest.mark.parametrize("end", ["\n", ""])
+def test_notes_may_be_missing(tmp_path: Path, end: str) -> None:
+    """As LabVIEW leaves them, without a separator before them."""
+    text = "\n".join([f"{TITLES},Comment", *ROWS[:-1], f"{ROWS[-1]},end of test"]) + end
+    assert read_content(tmp_path, text).columns["torque_nm"].size == len(ROWS)
+
+
 def test_notes_of_no_bad_row_leave_the_status_to_say_which_is_good(tmp_path: Path) -> None:
     text = marked("Status,Remark", "OK,", "sensor fault,oil topped up")
     assert pressures(tmp_path, text, good="ok") == [4, 6]
