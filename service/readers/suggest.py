@@ -139,7 +139,9 @@ def _attempt(
 def _titles(table: Table, reading: Reading) -> tuple[str, ...]:
     """All columns by their names in a profile."""
     wide, _ = in_columns(table, reading)
-    return tuple(dict.fromkeys(_title(own) for own in wide.columns if own.title and not own.name.startswith("=")))
+    return tuple(
+        dict.fromkeys(_title(own) for own in wide.columns if own.title and own.name and not own.name.startswith("="))
+    )
 
 
 # --- columns ---

@@ -247,6 +247,16 @@ def test_times_without_a_title_are_suggested_by_their_number(tmp_path: Path, cel
     assert same(tmp_path / "a.csv", expected, "dynamic_stribeck").map["time_s"].startswith("column 1")
 
 
+def test_an_empty_column_of_times_is_none_of_a_profile(tmp_path: Path) -> None:
+    """As LabVIEW writes it where it has no clock."""
+    (tmp_path / "a.lvm").write_text(
+        "X_Value\tp1 [bar]\tn1 [1/min]\tMz [Nm]\n" + rows([""] * 12, P, N, M, separator="\t")
+    )
+    profile = same(tmp_path / "a.lvm").profile
+    assert profile is not None
+    assert {column.title for column in profile.columns} == {"p1", "n1", "Mz"}
+
+
 @pytest.mark.parametrize("step", [0.5, 1])
 def test_an_index_of_pandas_is_asked_about_unless_it_counts_the_rows(tmp_path: Path, step: float) -> None:
     frame = pd.DataFrame(STACKED, index=np.arange(12) * step)
