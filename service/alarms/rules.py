@@ -99,9 +99,9 @@ def passes(rule: AlarmIn, result: Finding, hysteresis: float = 0.0) -> bool:
 
 def message(rule: AlarmIn, facts: ClutchFacts, result: Finding) -> str:
     """An alarm as a sentence, with the number of held runs."""
-    unit, held_count = _UNITS.get(rule.quantity), facts.summary.get("held", 0)
+    (unit, scale), held_count = _UNITS.get(rule.quantity, (None, 1)), facts.summary.get("held", 0)
     again = f"; less than {100 * STEPS[result.step - 1]:.0f} % of it is left" if result.step else ""
-    limit = "" if rule.limit is None or unit is None else f" (limit: {rule.limit:,.6g}{unit}{again})"
+    limit = "" if rule.limit is None or unit is None else f" (limit: {scale * rule.limit:,.6g}{unit}{again})"
     waiting = f"; {condition.held_in_words(held_count)}" if held_count and rule.quantity != "held_runs" else ""
     return f"{facts.clutch_id}: {result.words}{limit}{waiting}"
 
@@ -168,7 +168,7 @@ def _health(_rule: AlarmIn, facts: ClutchFacts) -> Finding | None:
     health = None if current is None else current["health"]
     if health is None or facts.summary.get("status") == ENDED:
         return None
-    return Finding(value=float(health), words=f"health {health:.0%}")
+    return Finding(value=float(health), words=f"health {100 * health:.0f} %")
 
 
 def _shudder_margin(rule: AlarmIn, facts: ClutchFacts) -> Finding | None:
@@ -248,11 +248,11 @@ _QUANTITIES: dict[str, Callable[[AlarmIn, ClutchFacts], Finding | None]] = {
     "state": _state,
     "silent_hours": _silent_hours,
 }
-#: The units of limits that a message states.
+#: The units of limits that a message states, and how many of them 1 is.
 _UNITS = {
-    "remaining_cycles": " cycles",
-    "remaining_days": " days",
-    "health": "",
-    "shudder_margin": " s/m",
-    "silent_hours": " h",
+    "remaining_cycles": (" cycles", 1),
+    "remaining_days": (" days", 1),
+    "health": (" %", 100),
+    "shudder_margin": (" s/m", 1),
+    "silent_hours": (" h", 1),
 }

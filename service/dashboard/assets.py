@@ -24,7 +24,8 @@ TYPES = {
     ".png": "image/png",
     ".svg": "image/svg+xml",
 }
-#: A page's module, and what a module imports.
+#: What a page includes, its module, and what a module imports.
+_INCLUDED = re.compile(r"\{(shared/\w+\.html)\}\n?")
 _MODULE = re.compile(r'<script type="module" src="\{assets\}/([^"]+)"></script>')
 _IMPORTED = re.compile(r'^(?:import|export)\b[^;"]*"(\.[^"]+)";', re.MULTILINE)
 
@@ -55,13 +56,14 @@ class Assets:
     digest: str
 
     def page(self, name: str, root: str) -> Asset:
-        """A page with its assets' addresses filled in, and links to preload all modules that its module imports.
+        """A page with its parts and addresses filled in, and links to preload all modules that its module imports.
 
         `root` leads from the page to the service's root: relative, so that a proxy may add a path.
         """
         raw = self.by_name[name]
+        whole = _INCLUDED.sub(lambda part: self.by_name[part[1]].body.decode(), raw.body.decode())
         text = (
-            _MODULE.sub(self._announced, raw.body.decode())
+            _MODULE.sub(self._announced, whole)
             .replace("{assets}", f"{root}assets/{self.digest}")
             .replace("{root}", root)
             .replace("{release}", version("clutchlife"))

@@ -1,10 +1,12 @@
 """The types of the API's answers for the checks of the dashboard's JavaScript, from the OpenAPI document.
 
-`python -m tests.javascript.types` writes `generated/types.d.ts` beside this file, an interface a schema, which every module
-knows without an import. Browsers never load it.
+`python -m tests.javascript.types` writes `generated/types.d.ts` beside this file, which every module knows without an
+import: an interface a schema, and the answer to each route, by which `read` and `send` know what an address holds.
+Browsers never load it.
 """
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +21,10 @@ type Table = (number | null)[][];
 /** A list's page; `next` is the cursor of the page after it. */
 interface ListPage<Item> { items: Item[]; next: string | null }
 type Channels = Record<string, number[]>;
+type ClutchPath = `/v1/clutches/${string}`;
+type Items<Path extends string> = AnswerTo<"GET", Path>["items"];
+type AnswerTo<Method extends string, Path extends string> =
+  Path extends `${infer Base}?${string}` ? ByRoute<`${Method} ${Base}`> : ByRoute<`${Method} ${Path}`>;
 """
 #: A schema whose name TypeScript has for something else.
 TAKEN = {"Parameters": "StribeckParameters"}
@@ -54,10 +60,34 @@ def interface(name: str, schema: dict[str, Any]) -> str:
     return f"interface {name} {{\n{''.join(fields)}}}\n"
 
 
+def answers(document: dict[str, Any]) -> str:
+    """The type of the answer to each route. A parameter matches slashes too, so that the longest routes come first, and of
+    those the ones with the fewest parameters."""
+    routes = sorted(document.get("paths", {}), key=lambda path: (-path.count("/"), path.count("{"), path))
+    choices = [
+        f"  Route extends `{method.upper()} {re.sub('{[^}]*}', '${string}', path)}` ? {type_of(schema)} :\n"
+        for path in routes
+        for method, operation in document["paths"][path].items()
+        if (schema := _answer(operation)) is not None
+    ]
+    return f"type ByRoute<Route extends string> =\n{''.join(choices)}  any;\n"
+
+
+def _answer(operation: dict[str, Any]) -> dict[str, Any] | None:
+    """The schema of what an operation answers in JSON when it succeeds."""
+    for status in ("200", "201", "202"):
+        content = operation.get("responses", {}).get(status, {}).get("content", {})
+        if "schema" in content.get("application/json", {}):
+            found: dict[str, Any] = content["application/json"]["schema"]
+            return found
+    return None
+
+
 def text(document: dict[str, Any]) -> str:
     """All types of an OpenAPI document."""
     schemas = document["components"]["schemas"]
-    return GENERAL + "".join(interface(TAKEN.get(name, name), schema) for name, schema in sorted(schemas.items()))
+    interfaces = (interface(TAKEN.get(name, name), schema) for name, schema in sorted(schemas.items()))
+    return GENERAL + "".join(interfaces) + answers(document)
 
 
 if __name__ == "__main__":

@@ -71,6 +71,7 @@ def test_a_receiver_is_tried_and_what_is_typed_wrong_stays(watched: Watched) -> 
     expect(form.get_by_role("alert")).to_have_count(1)
     expect(form.get_by_label("Address")).to_be_focused()
     assert "url" in form.get_by_role("alert").inner_text()
+    expect(form.locator(".answer")).to_be_empty()
     assert form.get_by_label("Address").input_value() == "ftp://example.org/hook"
     assert form.get_by_label("Name").input_value() == "shop floor"
     assert violations(page) == []

@@ -199,7 +199,7 @@ def test_each_quantity_raises(life: TestClient) -> None:
     """A test whose torque has risen is held, and off the course of those before it; that no run is held clears one alarm."""
     said = {
         "remaining_cycles": ({"probability": 0.5, "below": 1e9}, "50 % chance of "),
-        "health": ({"below": 1.0}, "health "),
+        "health": ({"below": 1.0}, " % (limit: 100 %)"),
         "shudder_margin": ({"below": 100.0}, "slope of friction at 100 rpm"),
         "off_course": ({}, "off course"),
         "held_runs": ({}, "1 held run waits"),

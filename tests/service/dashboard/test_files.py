@@ -41,6 +41,14 @@ def test_what_browsers_load_is_named_by_its_path_in_the_tree(tmp_path: Path) -> 
     assert loaded.page("page.html", "../").body.decode() == f'<a href="../">../assets/{loaded.digest}</a>'
 
 
+def test_a_page_has_what_it_includes(tmp_path: Path) -> None:
+    files = {"page.html": "<head>\n{shared/head.html}\n</head>\n", "shared/head.html": '<link href="{assets}/a.css">\n'}
+    loaded = assets.load(written(tmp_path, files))
+    assert loaded.page("page.html", "./").body.decode() == (
+        f'<head>\n<link href="./assets/{loaded.digest}/a.css">\n</head>\n'
+    )
+
+
 def test_a_page_names_all_modules_that_it_loads(tmp_path: Path) -> None:
     files = {
         "page.html": '<script type="module" src="{assets}/fleet/page.js"></script>',
@@ -245,3 +253,23 @@ def test_a_schema_is_an_interface() -> None:
         '"open": Record<string, any>;', 'interface StribeckParameters {\n  "own": StribeckParameters;',
     ):  # fmt: skip
         assert field in found, field
+
+
+def test_an_address_tells_the_type_of_its_answer_and_the_longest_route_is_tried_first() -> None:
+    def answered(status: str, schema: dict[str, Any]) -> dict[str, Any]:
+        return {"responses": {status: {"content": {"application/json": {"schema": schema}}}}}
+
+    item, several = {"$ref": "#/components/schemas/Item"}, {"type": "array", "items": {"type": "number"}}
+    paths = {
+        "/v1/items/{item_id}": {"get": answered("200", item), "delete": {"responses": {"204": {}}}},
+        "/v1/items/{item_id}/parts": {"post": answered("201", several)},
+        "/v1/items/first": {"get": answered("200", several)},
+    }
+    routes = [line.strip() for line in types.answers({"paths": paths}).splitlines()]
+    assert routes == [
+        "type ByRoute<Route extends string> =",
+        "Route extends `POST /v1/items/${string}/parts` ? (number)[] :",
+        "Route extends `GET /v1/items/first` ? (number)[] :",
+        "Route extends `GET /v1/items/${string}` ? Item :",
+        "any;",
+    ]

@@ -2,13 +2,15 @@
 // the API go in; lists, a form and tests come out, of all clutches or of one. Open this file first, then form.js (a rule as a sentence
 // and in a dialog).
 
-import { read, readAll, send } from "../shared/api.js";
+import { pageOf, read, readAll, send } from "../shared/api.js";
 import { button, h, quiet, scrolling, table } from "../shared/dom.js";
 import { rowFiles } from "../shared/files.js";
-import { moment } from "../shared/format.js";
+import { counted, moment } from "../shared/format.js";
 import { problemView } from "../shared/problem_view.js";
 import { askReceiver, askRule, ruleText } from "./form.js";
 import { askAcknowledge } from "./raised.js";
+
+/** @import { Content } from "../shared/dom.js" */
 
 /** Events that are shown, and deliveries of each receiver; the lists of the API hold all. */
 const SHOWN = 50;
@@ -16,18 +18,30 @@ const DELIVERIES = 10;
 /** @type {Record<EventOut["state"], string>} */
 const STATES = { raised: "Not acknowledged", acknowledged: "Acknowledged", cleared: "Over" };
 
+/** Of an alarm in saved files. */
+const SAVED = /** @type {const} */ ([
+  "raised_at",
+  "clutch_id",
+  "message",
+  "state",
+  "acknowledged_by",
+  "note",
+  "value",
+  "limit",
+]);
+
 /** @type {(place: HTMLElement, clutchId: string | null) => () => Promise<void>} of all clutches where it is null */
 export function alarms(place, clutchId) {
-  const [rulesStatus, receiversStatus] = [h("div", { role: "status" }), h("div", { role: "status" })];
-  const events = h("section", { "aria-label": "Alarms" });
-  const rules = h("section", { "aria-label": "Rules" });
-  const receivers = h("section", { "aria-label": "Receivers" });
-  place.replaceChildren(events, rules, receivers);
+  place.replaceChildren();
+  const raised = ["Raised", "Clutch", "What", "State", "Action"];
+  const events = part("Alarms", raised, "No alarm has been raised.", "Alarms, the newest first");
+  const rules = part("Rules", ["An alarm when", "Of", "Action"], "No rule yet: nothing raises an alarm.");
+  const called = ["Name", "Address", "Of", "Deliveries", "Action"];
+  const receivers = part("Receivers", called, "No receiver yet: alarms appear on this page only.");
   let shown = "";
 
   async function show() {
     const of = clutchId === null ? "" : `&clutch_id=${encodeURIComponent(clutchId)}`;
-    /** @type {[{ body: { items: EventOut[] } }, { items: AlarmOut[] }, { items: WebhookOut[] }]} */
     const [{ body }, allRules, allReceivers] = await Promise.all([
       read(`/v1/alarms/events?limit=${SHOWN}${of}`),
       readAll("/v1/alarms?limit=1000"),
@@ -36,7 +50,6 @@ export function alarms(place, clutchId) {
     const own = (/** @type {{ clutch_id: string | null }} */ { clutch_id: id }) =>
       clutchId === null || id === null || id === clutchId;
     const ownReceivers = allReceivers.items.filter(own);
-    /** @type {{ body: { items: DeliveryOut[] } }[]} */
     const sent = await Promise.all(
       ownReceivers.map(({ webhook_id: id }) => read(`/v1/webhooks/${id}/deliveries?limit=${DELIVERIES}`)),
     );
@@ -44,118 +57,104 @@ export function alarms(place, clutchId) {
     const text = JSON.stringify([body.items, allRules.items, ownReceivers, deliveries]);
     if (text === shown) return;
     shown = text;
-    drawEvents(body.items);
-    drawRules(allRules.items.filter(own));
-    drawReceivers(ownReceivers, deliveries);
+    const header = SAVED.map((name) => name.replace("_id", "").replaceAll("_", " "));
+    const saved = body.items.map((event) => SAVED.map((name) => event[name]));
+    events.draw(body.items.map(eventRow), rowFiles("alarms", [header, ...saved]));
+    const rule = button("New rule …", () => changed(null), { class: "main" });
+    rules.draw(allRules.items.filter(own).map(ruleRow), rule);
+    const receiver = button("New receiver …", async () => (await askReceiver(clutchId)) && show());
+    receivers.draw(
+      ownReceivers.map((each, index) => receiverRow(each, deliveries[index])),
+      receiver,
+    );
   }
 
-  /** @param {EventOut[]} raised */
-  function drawEvents(raised) {
-    const acknowledge = async (/** @type {EventOut} */ event) => (await askAcknowledge(event)) && show();
-    const rows = raised.map((event) => [
+  /** @param {EventOut} event */
+  function eventRow(event) {
+    const acknowledge = async () => (await askAcknowledge(event)) && show();
+    return [
       moment(event.raised_at),
-      h("a", { href: `/clutches/${encodeURIComponent(event.clutch_id)}` }, event.clutch_id),
+      h("a", { href: pageOf(event.clutch_id) }, event.clutch_id),
       event.message,
       event.state === "acknowledged" ? acknowledgedText(event) : STATES[event.state],
-      event.state === "raised" && act("Acknowledge …", () => acknowledge(event), event.message),
-    ]);
-    const columns = ["Raised", "Clutch", "What", "State", "Action"];
-    events.replaceChildren(
-      ...listed("Alarms", "No alarm has been raised.", table("Alarms, the newest first", columns, rows)),
-      rowFiles("alarms", [
-        ["raised at", "clutch", "message", "state", "acknowledged by", "note", "value", "limit"],
-        ...raised.map((e) => [
-          e.raised_at,
-          e.clutch_id,
-          e.message,
-          e.state,
-          e.acknowledged_by,
-          e.note,
-          e.value,
-          e.limit,
-        ]),
-      ]),
-    );
+      event.state === "raised" && act("Acknowledge …", acknowledge, event.message),
+    ];
   }
 
-  /** @param {AlarmOut[]} own */
-  function drawRules(own) {
-    const rows = own.map((rule) => {
-      const text = ruleText(rule);
-      const path = `/v1/alarms/${rule.alarm_id}`;
-      const test = act("Test", () => tested(path, rulesStatus), text);
-      const change = act("Change …", () => changed(rule), text);
-      return [
-        [rule.name && h("b", `${rule.name}: `), text, !rule.enabled && h("span.tag", "off")],
-        rule.clutch_id ?? "all clutches",
-        h(
-          "div.row.buttons.start",
-          test,
-          change,
-          act("Delete", () => told("DELETE", path, rulesStatus), text),
-        ),
-      ];
-    });
-    const all = table("Rules", ["An alarm when", "Of", "Action"], rows);
-    rules.replaceChildren(
-      ...listed("Rules", "No rule yet: nothing raises an alarm.", all),
-      rulesStatus,
-      button("New rule …", () => changed(null), { class: "main" }),
-    );
+  /** @param {AlarmOut} rule */
+  function ruleRow(rule) {
+    const text = ruleText(rule);
+    const change = act("Change …", () => changed(rule), text);
+    return [
+      [rule.name && h("b", `${rule.name}: `), text, !rule.enabled && h("span.tag", "off")],
+      rule.clutch_id ?? "all clutches",
+      rules.actions(`/v1/alarms/${rule.alarm_id}`, text, change),
+    ];
   }
 
-  /** @type {(own: WebhookOut[], deliveries: DeliveryOut[][]) => void} `deliveries`: the newest of each, the newest first */
-  function drawReceivers(own, deliveries) {
-    const rows = own.map(({ webhook_id: id, name, url, clutch_id: of }, index) => {
-      const path = `/v1/webhooks/${id}`;
-      return [
-        name || "–",
-        url,
-        of ?? "all clutches",
-        deliveries[index].length > 0 ? deliveriesView(url, deliveries[index]) : "nothing sent yet",
-        h(
-          "div.row.buttons.start",
-          act("Test", () => tested(path, receiversStatus), url),
-          act("Delete", () => told("DELETE", path, receiversStatus), url),
-        ),
-      ];
-    });
-    const all = table("Receivers", ["Name", "Address", "Of", "Deliveries", "Action"], rows);
-    receivers.replaceChildren(
-      ...listed("Receivers", "No receiver yet: alarms appear on this page only.", all),
-      receiversStatus,
-      button("New receiver …", async () => (await askReceiver(clutchId)) && show()),
-    );
-  }
-
-  /** @type {(label: string, onclick: () => unknown, of: string) => HTMLButtonElement} `of`: what it is done to */
-  const act = (label, onclick, of) => button(label, onclick, { class: "small", "aria-label": `${label}: ${of}` });
-
-  /** @type {(path: string, status: HTMLElement) => Promise<void>} send a test, and say how it went */
-  async function tested(path, status) {
-    status.replaceChildren(quiet("Sending a test …"));
-    const answer = await told("POST", `${path}/test`, status);
-    if (answer) status.replaceChildren(h("p.notice", answer.body.message));
+  /** @type {(receiver: WebhookOut, deliveries: DeliveryOut[]) => Content[]} `deliveries`: the newest first */
+  function receiverRow({ webhook_id: id, name, url, clutch_id: of }, deliveries) {
+    return [
+      name || "–",
+      url,
+      of ?? "all clutches",
+      deliveries.length > 0 ? deliveriesView(url, deliveries) : "nothing sent yet",
+      receivers.actions(`/v1/webhooks/${id}`, url),
+    ];
   }
 
   /** @param {AlarmOut | null} rule null: a new one */
   const changed = async (rule) => (await askRule(rule, clutchId)) && show();
 
-  /** @type {(method: string, path: string, status: HTMLElement) => Promise<any>} null where it was refused, which `status` says */
-  async function told(method, path, status) {
-    try {
-      const answer = await send(method, path, {});
-      status.replaceChildren();
-      await show();
-      return answer;
-    } catch (problem) {
-      status.replaceChildren(problemView(problem, "Nothing was changed. "));
-      return null;
+  /** @type {(title: string, columns: string[], empty: string, caption?: string) => Part} a section with a list, and what became of an action below it */
+  function part(title, columns, empty, caption = title) {
+    const status = h("div", { role: "status" });
+    const section = h("section", { "aria-label": title });
+    place.append(section);
+
+    /** @type {(method: string, path: string) => Promise<any>} null where it was refused */
+    async function told(method, path) {
+      try {
+        const answer = await send(method, path, {});
+        status.replaceChildren();
+        await show();
+        return answer;
+      } catch (problem) {
+        status.replaceChildren(problemView(problem, "Nothing was changed. "));
+        return null;
+      }
     }
+
+    /** @param {string} path send a test, and say how it went */
+    async function tested(path) {
+      status.replaceChildren(quiet("Sending a test …"));
+      const answer = await told("POST", `${path}/test`);
+      if (answer) status.replaceChildren(h("p.notice", answer.body.message));
+    }
+
+    return {
+      draw: (rows, below) => {
+        const list = rows.length > 0 && h("div.panel", scrolling(title, table(caption, columns, rows)));
+        section.replaceChildren(h("h2", title), list || quiet(empty), status, below);
+      },
+      actions: (path, of, more = null) => {
+        const [test, remove] = [() => tested(path), () => told("DELETE", path)];
+        return h("div.row.buttons.start", act("Test", test, of), more, act("Delete", remove, of));
+      },
+    };
   }
 
   return show;
 }
+
+/**
+ * @typedef {object} Part
+ * @property {(rows: Content[][], below: Node) => void} draw
+ * @property {(path: string, of: string, more?: Content) => HTMLElement} actions on what the path names; `of`: its name
+ */
+
+/** @type {(label: string, onclick: () => unknown, of: string) => HTMLButtonElement} `of`: what it is done to */
+const act = (label, onclick, of) => button(label, onclick, { class: "small", "aria-label": `${label}: ${of}` });
 
 /** @param {EventOut} event */
 const acknowledgedText = ({ acknowledged_by: by, note }) => `Acknowledged by ${by ?? ""}${note && `: ${note}`}`;
@@ -179,11 +178,5 @@ function deliveryText({ state, attempts, problem, delivered_at: at, next_attempt
   if (state === "delivered") return `Delivered ${moment(at)}`;
   const reason = problem ? `: ${problem}` : "";
   if (state === "failed") return `Failed${reason}`;
-  return `Waiting after ${attempts} ${attempts === 1 ? "attempt" : "attempts"}${reason}${next ? `; next ${moment(next)}` : ""}`;
+  return `Waiting after ${counted(attempts, "attempt")}${reason}${next ? `; next ${moment(next)}` : ""}`;
 }
-
-/** @type {(title: string, empty: string, all: HTMLTableElement) => HTMLElement[]} a heading, and the rows or that there are none */
-const listed = (title, empty, all) => [
-  h("h2", title),
-  all.tBodies[0].rows.length === 0 ? quiet(empty) : h("div.panel", scrolling(title, all)),
-];

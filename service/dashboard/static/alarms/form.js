@@ -1,15 +1,16 @@
 // What a rule of an alarm watches, a rule as part of a sentence, and the questions of the alarms' page: a rule, a receiver. Each
 // sends what is typed, which stays where the service refuses it.
 
-import { Problem, send } from "../shared/api.js";
+import { send } from "../shared/api.js";
 import { asked } from "../shared/dialog.js";
-import { field, h, select } from "../shared/dom.js";
-import { fixed, NOT_A_NUMBER, numberOf, percent, significant, words } from "../shared/format.js";
+import { field, h, offered, select } from "../shared/dom.js";
+import { fixed, percent, significant, words } from "../shared/format.js";
+import { numbersOf } from "../shared/problem_view.js";
 
 /** @typedef {AlarmOut["quantity"]} Watched */
 
 /** @type {Record<Watched, { title: string, side: "below" | "above" | null, unit: string, limit: string }>} */
-export const WATCHED = {
+const WATCHED = {
   remaining_cycles: { title: "Remaining cycles, safe bound", side: "below", unit: "cycles", limit: "4000" },
   remaining_days: { title: "Remaining days at the pace so far", side: "below", unit: "days", limit: "14" },
   health: { title: "Health", side: "below", unit: "", limit: "0.2" },
@@ -26,7 +27,7 @@ export function ruleText({ quantity, below, above, probability, any_of: names, m
   const { title, side, unit } = WATCHED[quantity];
   if (side === null) return names ? `${title} (${names.map((name) => words(name).toLowerCase()).join(", ")})` : title;
   const limit = below ?? above ?? 0;
-  const value = Math.abs(limit) >= 100 ? fixed(limit) : significant(limit, 3);
+  const value = quantity === "health" ? percent(limit) : Math.abs(limit) >= 100 ? fixed(limit) : significant(limit, 3);
   const sure = probability === 0.05 ? "" : `, ${percent(probability)} quantile`;
   const shown = hasMedian(quantity) && within !== null ? `, median below ${within} times that` : "";
   return `${title} ${side} ${value}${unit && ` ${unit}`}${sure}${shown}`;
@@ -38,13 +39,8 @@ const hasMedian = (quantity) => quantity.startsWith("remaining");
 /** @type {(name: string, value: string) => HTMLInputElement} `name`: of the field that is sent */
 const input = (name, value) => h("input", { id: `alarm-${name}`, name, value });
 
-/** @type {(input: HTMLInputElement) => number | null} what is typed; a Problem at the field where it is no number */
-function typed({ name, value }) {
-  const number = numberOf(value);
-  if (number !== undefined) return number;
-  const error = { pointer: `/${name}`, message: NOT_A_NUMBER, row: null, value };
-  throw new Problem(422, { detail: NOT_A_NUMBER, errors: [/** @type {ProblemError} */ (error)] });
-}
+/** @param {HTMLInputElement} input a number, null where nothing is typed */
+const typed = (input) => numbersOf([input])[0];
 
 /**
  * @param {AlarmOut | null} rule null: a new one
@@ -52,7 +48,7 @@ function typed({ name, value }) {
  */
 export function askRule(rule, clutchId) {
   const first = rule?.quantity ?? "remaining_cycles";
-  const options = Object.entries(WATCHED).map(([name, { title }]) => /** @type {[string, string]} */ ([name, title]));
+  const options = offered(Object.keys(WATCHED), (name) => WATCHED[/** @type {Watched} */ (name)].title);
   const quantity = select({ id: "alarm-quantity" }, options, first);
   const limit = input("limit", String(rule?.below ?? rule?.above ?? WATCHED[first].limit));
   const share = input("hysteresis", String(100 * (rule?.hysteresis ?? 0.1)));

@@ -4,20 +4,18 @@
 import { read, send } from "../shared/api.js";
 import { asked } from "../shared/dialog.js";
 import { button, byId, field, h } from "../shared/dom.js";
-
-/** @type {(count: number) => string} */
-const countText = (count) => `${count} ${count === 1 ? "alarm" : "alarms"}`;
+import { counted } from "../shared/format.js";
 
 /** @type {(count: number) => void} the number in the bar */
 export function showRaised(count) {
   const link = byId("raised");
   link.hidden = count === 0;
-  if (link.textContent !== countText(count)) link.textContent = countText(count);
+  const text = counted(count, "alarm");
+  if (link.textContent !== text) link.textContent = text;
 }
 
 /** The number in the bar of a page that reads nothing else of all clutches. */
 export async function pollRaised() {
-  /** @type {{ body: FleetTotals }} */
   const { body } = await read("/v1/fleet/totals");
   showRaised(body.alarms);
 }
@@ -25,7 +23,7 @@ export async function pollRaised() {
 /** @type {(alarms: EventOut[], href: string) => HTMLElement | false} the number in a clutch's row */
 export const raisedLink = (alarms, href) =>
   alarms.length > 0 &&
-  h("a.raised", { href, title: alarms.map(({ message }) => message).join("\n") }, countText(alarms.length));
+  h("a.raised", { href, title: alarms.map(({ message }) => message).join("\n") }, counted(alarms.length, "alarm"));
 
 /** @type {(alarms: EventOut[], done: () => unknown) => HTMLElement[]} themselves, in a clutch's head */
 export const raisedNotices = (alarms, done) =>

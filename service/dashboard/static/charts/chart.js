@@ -10,8 +10,7 @@ import { colours } from "./palette.js";
 import { pngOf, svgOf } from "./picture.js";
 import { reading } from "./reading.js";
 
-/** @typedef {{ id: string, title: string, wide?: boolean, height?: number }} Place height: px */
-/** @typedef {Place & { name: () => string, letter?: [string, string] | null }} Options name: of saved files; letter: with its index */
+/** @typedef {{ id: string, title: string, wide?: boolean, height?: number, letter?: [string, string] | null }} Options height: px; letter: with its index */
 
 const MOST_ROWS = 400;
 const HELP = "Arrow keys read its values, + and − zoom, Escape shows all. The numbers are in the table below.";
@@ -20,10 +19,9 @@ const SAVED = { width: 1000, height: 600 };
 
 export class Chart {
   /** @param {Options} options */
-  constructor({ id, title, name, letter = null, wide = false, height = 360 }) {
+  constructor({ id, title, letter = null, wide = false, height = 360 }) {
     this.id = id;
     this.title = title;
-    this.name = name;
     this.height = height;
     /** @type {Spec | null} */
     this.spec = null;
@@ -155,11 +153,15 @@ export class Chart {
     saveTable(this.file(format), [columns.map(({ name }) => name), ...rows]);
   }
 
-  /** @param {string} ending */
+  /** @param {string} ending of a saved file's name, which says what page the chart is of */
   file(ending) {
-    return `${this.name()}-${this.id}.${ending}`;
+    const [page] = document.title.split(" · ");
+    return `${page}-${this.id}.${ending}`.replaceAll(/[^\w.-]+/g, "_");
   }
 }
+
+/** @type {(...charts: Chart[]) => HTMLElement} beside each other */
+export const chartsOf = (...charts) => h("div.charts", ...charts.map(({ element }) => element));
 
 /** @type {(value: Cell, column: Column) => string} */
 function cellText(value, { text }) {

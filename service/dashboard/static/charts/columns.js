@@ -19,27 +19,38 @@ export const digitsColumn = (name, digits) => ({ name, text: (value) => signific
 export const intervalColumns = (name, digits) =>
   [name, "lower, 5 %", "upper, 95 %"].map((each) => digitsColumn(each, digits));
 
-/** The torque or the coefficient that is shown, in its unit. */
-export const torqueColumn = () => column(named(units().torque), units().torque.decimals);
-
 export const CYCLES = column("cycles");
 export const PRESSURE = column("pressure, bar", 1);
 
+/** Of torque, or the coefficient that is shown for it, over speed. */
+export const recordColumns = () => [
+  KIND,
+  CYCLES,
+  PRESSURE,
+  column("speed, rpm", 1),
+  column(named(units().torque), units().torque.decimals),
+];
+
+/** @type {(value: number, sd: number) => number[]} with its 90 % interval */
+export const withInterval = (value, sd) => [value, value - HALF_OF_90 * sd, value + HALF_OF_90 * sd];
+
 /**
- * Measured values and eq. 6 as rows: kind, what `before` holds, cycles, value and its 90 % interval.
+ * Measured values and the tracked course as rows: kind, what `before` holds, cycles, value and its 90 % interval.
  * @param {{ measured: Measured, trajectory: Trajectory }} item
- * @param {{ measured: string, law: string, before?: Cell[] }} kinds
+ * @param {"measured" | "identified"} kind of the values
+ * @param {Cell[]} before
  * @returns {Cell[][]}
  */
-export function measuredAndLaw({ measured, trajectory }, { measured: kind, law, before = [] }) {
-  const points = measured.cycles.map((at, index) => {
-    const [value, half] = [measured.value[index], HALF_OF_90 * measured.sd[index]];
-    return [kind, ...before, at, value, value - half, value + half];
-  });
-  const { median, lower, upper } = trajectory;
-  const line = trajectory.cycles.map((at, index) => [law, ...before, at, median[index], lower[index], upper[index]]);
-  return [...points, ...line];
+export function measuredAndTracked({ measured: { cycles, value, sd }, trajectory }, kind, ...before) {
+  const { cycles: x, median, lower, upper } = trajectory;
+  return [
+    ...cycles.map((at, index) => [kind, ...before, at, ...withInterval(value[index], sd[index])]),
+    ...x.map((at, index) => ["tracked", ...before, at, median[index], lower[index], upper[index]]),
+  ];
 }
+
+/** @type {(items: { pressure_bar: number | null }[]) => number[]} the pressures that there are, bar */
+export const levelsOf = (items) => distinct(items.flatMap(({ pressure_bar: level }) => level ?? []));
 
 /** @type {(values: number[]) => number[]} values in ascending order, each once */
 export const distinct = (values) => [...new Set(values)].sort((a, b) => a - b);

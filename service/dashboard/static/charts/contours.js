@@ -4,7 +4,7 @@ import { readOut, ticksOf } from "./frame.js";
 import { blend, rampOf } from "./palette.js";
 
 /** @typedef {[number, number]} Point in the grid's units */
-/** @typedef {Grid & { name: string, measured: { x: number, y: number, z: number }[] }} Surface */
+/** @typedef {Grid & { name: string, points: string, measured: { x: number, y: number, z: number }[] }} Surface */
 
 /** @type {(corners: { at: Point, z: number }[], level: number) => { kept: Point[], ends: Point[] }} of a triangle, from a level up */
 function cut(corners, level) {
@@ -46,15 +46,13 @@ export function isolines({ x, y, values }, level) {
   return { above, lines };
 }
 
-/** @type {(xs: number[], values: Values, at: number) => number | null} between the points */
-function between(xs, values, at) {
-  const index = Math.max(
-    1,
-    xs.findIndex((x) => x >= at),
-  );
-  const [a, b] = [values[index - 1], values[index]];
-  if (a === null || b === null || at > xs[index]) return null;
-  return a + ((b - a) * (at - xs[index - 1])) / (xs[index] - xs[index - 1]);
+/** @type {(xs: number[], values: Values, at: number) => number | null} between the points; before them the first, past them none */
+export function between(xs, values, at) {
+  const next = xs.findIndex((x) => x >= at);
+  if (next <= 0) return values[next] ?? null;
+  const [a, b] = [values[next - 1], values[next]];
+  if (a === null || b === null) return null;
+  return a + ((b - a) * (at - xs[next - 1])) / (xs[next] - xs[next - 1]);
 }
 
 /** @type {(title: string, values: number[]) => [number, string][]} each with its name, to as many digits as distinguish them */
@@ -69,19 +67,11 @@ const named = (title, values) =>
  */
 export function cutsOf(surfaces, { x, y }, wanted) {
   const [{ x: xs, y: ys }] = surfaces;
-  const round = ticksOf([xs[0], xs[xs.length - 1]], 400, 80).filter(({ at }) => at >= xs[0]);
+  const round = ticksOf([xs[0], xs[xs.length - 1]], 400, 80).map(({ at }) => at);
   /** @type {(axis: string, choices: [number, string][]) => [string, string][]} */
   const keyed = (axis, choices) => choices.map(([at, text]) => [`${axis} ${at}`, text]);
-  const options = [
-    ...keyed("y", named(y, ys)),
-    ...keyed(
-      "x",
-      named(
-        x,
-        round.map(({ at }) => at),
-      ),
-    ),
-  ];
+  const inside = round.filter((at) => at >= xs[0]);
+  const options = [...keyed("y", named(y, ys)), ...keyed("x", named(x, inside))];
   const chosen = options.find(([key]) => key === wanted)?.[0] ?? `y ${ys[Math.floor(ys.length / 2)]}`;
   return { options, chosen };
 }
@@ -139,7 +129,7 @@ export function contoured(surfaces, { x, y, z }, { options, chosen }, c) {
       y: z,
       curves: [
         ...along,
-        { name: near.length > 0 ? "measured" : "", ...placesOf(near, "z"), marker: { color: c.ink, size: 4 } },
+        { name: near.length > 0 ? surfaces[0].points : "", ...placesOf(near, "z"), marker: { color: c.ink, size: 4 } },
       ],
     },
   ];

@@ -45,11 +45,9 @@ function panelOf(frame, size, c) {
       (panel.fields ?? []).flatMap((field) => fieldOf(field, x, y, size, c)),
       panel.curves.flatMap((curve) => curveOf(curve, x, y)),
       (panel.marks ?? []).map(({ x: at, y: level, line }) => {
-        const ends =
-          at === undefined
-            ? { x1: 0, x2: inside.width, y1: px(y.to(level ?? 0)), y2: px(y.to(level ?? 0)) }
-            : { x1: px(x.to(at)), x2: px(x.to(at)), y1: 0, y2: inside.height };
-        return svg("line", { ...ends, ...strokeOf(line) });
+        const d =
+          at === undefined ? `M0 ${px(y.to(level ?? 0))}H${inside.width}` : `M${px(x.to(at))} 0V${inside.height}`;
+        return svg("path", { d, fill: "none", ...strokeOf(line) });
       }),
     ),
     svg("path", { d: axes, fill: "none", stroke: c.edge }),
@@ -201,32 +199,29 @@ function fieldOf({ x: xs, y: ys, values, levels, fill, line: own }, x, y, size, 
 /** @type {(mark: Mark, frame: Frame) => SVGTextElement | null} a mark's text beside its line, where that is in sight */
 function noted({ x: at, y: level, text, turned, line }, { x, y, l, t, inside }) {
   const look = { fill: line.color, "font-size": turned ? 11 : 12 };
-  if (at === undefined) {
-    const top = y.to(level ?? 0);
-    return top < 0 || top > inside.height ? null : label(text, { ...look, x: l + 2, y: px(t + top - 5) });
-  }
-  const left = l + x.to(at);
-  if (left < l || left > l + inside.width) return null;
+  const [place, length] = at === undefined ? [y.to(level ?? 0), inside.height] : [x.to(at), inside.width];
+  if (place < 0 || place > length) return null;
+  if (at === undefined) return label(text, { ...look, x: l + 2, y: px(t + place - 5) });
   return turned
-    ? label(text, { ...look, transform: `translate(${px(left + 5)} ${px(t + 2)}) rotate(90)` })
-    : label(text, { ...look, x: px(left - 4), y: t + 14, "text-anchor": "end" });
+    ? label(text, { ...look, transform: `translate(${px(l + place + 5)} ${px(t + 2)}) rotate(90)` })
+    : label(text, { ...look, x: px(l + place - 4), y: t + 14, "text-anchor": "end" });
 }
 
 /** @type {(entry: LegendEntry, size: number) => SVGGElement} an entry of the legend */
 function key({ curve: { name, line, marker, lower, fill }, x, y }, size) {
-  const [from, middle] = [x + 5, y];
+  const from = x + 5;
   return svg(
     "g",
-    lower && svg("rect", { x: from, y: middle - 3, width: 30, height: 6, fill }),
+    lower && svg("rect", { x: from, y: y - 3, width: 30, height: 6, fill }),
     line &&
       svg("line", {
         x1: from,
         x2: from + 30,
-        y1: middle,
-        y2: middle,
+        y1: y,
+        y2: y,
         ...strokeOf({ ...line, width: Math.min(10, line.width ?? 2) }),
       }),
-    marker && dot(from + 15, middle, marker),
-    label(name ?? "", { x: x + 40, y: middle + 0.35 * size }),
+    marker && dot(from + 15, y, marker),
+    label(name ?? "", { x: x + 40, y: y + 0.35 * size }),
   );
 }

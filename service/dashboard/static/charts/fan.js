@@ -1,13 +1,13 @@
 // Mean COF, its law with the 90 % band, the threshold and when it is reached; behind it the earlier predictions.
 
 import { cycles, estimate, fixed, interval, probability } from "../shared/format.js";
-import { column, CYCLES, KIND, measuredAndLaw } from "./columns.js";
+import { CYCLES, intervalColumns, KIND, measuredAndTracked } from "./columns.js";
 import { faint } from "./palette.js";
 import { band, eventMarks, measuredPoints } from "./traces.js";
 
 /** @typedef {{ at: number, cof: number | null, remaining: SeriesItem }} Prediction made at `at` cycles, when mean COF was `cof` */
 
-const COLUMNS = [KIND, CYCLES, column("mean COF", 4), column("lower, 5 %", 4), column("upper, 95 %", 4)];
+const COLUMNS = [KIND, CYCLES, ...intervalColumns("mean COF", 4)];
 
 /**
  * @param {{ life: RemainingLife, pooled: DegradationItem | undefined, predictions: Prediction[], events: Receipt[] }} answers
@@ -21,7 +21,7 @@ export function fan({ life, pooled, predictions, events }) {
   return {
     note: noteOf(life),
     columns: COLUMNS,
-    rows: [...measuredAndLaw(pooled, { measured: "measured", law: "law" }), ...endRows(life)],
+    rows: [...measuredAndTracked(pooled, "measured"), ...endRows(life)],
     figure: (c) => [
       {
         x: { title: "duty cycles", range: [-0.01 * last, last] },

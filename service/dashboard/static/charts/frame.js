@@ -84,7 +84,6 @@ function scaleOf(axis, range, start, end, least) {
   const inner = axis.log ? Math.log10 : Number;
   const [from, to] = range.map(inner);
   const length = Math.abs(end - start);
-  const linear = () => ticksOf(range, length, least);
   return {
     axis,
     range,
@@ -97,7 +96,7 @@ function scaleOf(axis, range, start, end, least) {
       ? namesOf(axis.names, range, length / 40)
       : axis.log && to - from > 0.7
         ? powersOf(range)
-        : linear(),
+        : ticksOf(range, length, least),
   };
 }
 

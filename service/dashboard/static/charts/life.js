@@ -1,7 +1,7 @@
 // Remaining cycles as they were predicted at each test, and mean COF at every pressure.
 
-import { fixed } from "../shared/format.js";
-import { column, CYCLES, distinct, PRESSURE } from "./columns.js";
+import { counted } from "../shared/format.js";
+import { column, CYCLES, distinct, intervalColumns, PRESSURE } from "./columns.js";
 import { band, linesByPressure, planar } from "./traces.js";
 
 /** @import { Prediction } from "./fan.js" */
@@ -21,15 +21,14 @@ export function remainingCycles({ life, predictions, events }) {
   const top =
     1.12 * Math.max(1, end ?? 0, ...later.map(({ value, upper }) => Math.min(upper ?? Infinity, 2.2 * value + 1)));
   const above = made.filter(({ value }) => value > top).length;
-  const beyond =
-    above > 0 ? ` ${above} early ${above === 1 ? "prediction lies" : "predictions lie"} above the chart.` : "";
+  const beyond = above > 0 && ` ${counted(above, "early prediction lies", "early predictions lie")} above the chart.`;
   const comparison =
     end === null
       ? ""
       : "A perfect prediction would lie on the dashed line. This line ends at the end of life as predicted today.";
   return {
-    note: `The median and the 90 % interval as predicted at that time. ${comparison}${beyond}`,
-    columns: [CYCLES, column("remaining cycles"), column("lower, 5 %"), column("upper, 95 %")],
+    note: `The median and the 90 % interval as predicted at that time. ${comparison}${beyond || ""}`,
+    columns: [CYCLES, ...intervalColumns("remaining cycles", 4)],
     rows: predictions.map(({ at, remaining: r }) => [at, r.value, r.lower, r.upper]),
     figure: planar("duty cycles at the prediction", { title: "remaining cycles", range: [0, top] }, events, (c) =>
       predictionTraces(made, end, top, c),
@@ -72,9 +71,8 @@ export function meanCof({ tests, events }) {
   });
   if (values.length === 0) return { empty: "Mean COF is known from the first stationary test on." };
   const pressures = distinct(values.map(({ pressure }) => pressure));
-  const count = pressures.length === 1 ? "one pressure" : `${fixed(pressures.length)} pressures`;
   return {
-    note: `Mean over the speeds of the first test, at ${count}, with 90 % error bars.`,
+    note: `Mean over the speeds of the first test, at ${counted(pressures.length, "pressure")}, with 90 % error bars.`,
     columns: [CYCLES, PRESSURE, column("mean COF", 4), column("standard deviation", 5)],
     rows: values.map(({ cycles, pressure, value, sd }) => [cycles, pressure, value, sd]),
     figure: planar("duty cycles", "mean COF", events, (c) => linesByPressure(values, 5, c)),

@@ -3,7 +3,7 @@
 
 import { fixed } from "../shared/format.js";
 import { named, pressureText, units } from "../shared/units.js";
-import { column, CYCLES, distinct, KIND, PRESSURE, torqueColumn } from "./columns.js";
+import { recordColumns } from "./columns.js";
 import { pressureRampOf, rampOf } from "./palette.js";
 import { curveOf, inUnit, measuredOf, xyOf } from "./stribeck_law.js";
 import { planar } from "./traces.js";
@@ -16,9 +16,6 @@ const LOOP = { most: 1500, gap: 0.1 };
 
 const NO_LOOPS =
   "No dynamic Stribeck test yet. Send one as kind dynamic_stribeck: speed swept to and fro at constant pressure, sampled.";
-
-/** @param {LoopItem[]} loops */
-export const loopPressures = (loops) => distinct(loops.map((loop) => loop.pressure_bar));
 
 /**
  * The stationary curve of the state that a loop is of: of the test at the same cycles and pressure; empty where there is none.
@@ -84,7 +81,7 @@ export function loopCurves({ loops, tests, clutch, channels, over, pressure, run
       drawn.map(({ loop }) => loop),
       label,
     )}`,
-    columns: [KIND, CYCLES, PRESSURE, column("speed, rpm", 1), torqueColumn()],
+    columns: recordColumns(),
     rows: drawn.flatMap(({ loop: { cycles, pressure_bar: level }, trace, stationary }) => [
       ...trace.map(({ speed, torque }) => ["loop", cycles, level, speed, torque]),
       ...stationary.map(({ speed, torque }) => ["stationary curve", cycles, level, speed, torque]),

@@ -1,8 +1,8 @@
 // The four Stribeck parameters over cycles: eq. 6 with its band at one pressure (fig. 10), and over all of them (fig. 11).
 
 import { estimate } from "../shared/format.js";
-import { CYCLES, intervalColumns, KIND, measuredAndLaw, PRESSURE } from "./columns.js";
-import { contoured, cutsOf } from "./contours.js";
+import { CYCLES, intervalColumns, KIND, measuredAndTracked, PRESSURE } from "./columns.js";
+import { between, contoured, cutsOf } from "./contours.js";
 import { measuredPoints, planar, tracked } from "./traces.js";
 
 /** @typedef {"static_torque_nm" | "coulomb_ratio" | "stribeck_velocity_m_s" | "viscous_coefficient"} ParameterName */
@@ -24,9 +24,6 @@ export function axisOf(name) {
 }
 
 const COLUMNS = [KIND, PRESSURE, CYCLES, ...intervalColumns("value", 4)];
-
-/** @param {DegradationItem} item */
-const rowsOf = (item) => measuredAndLaw(item, { measured: "identified", law: "law", before: [item.pressure_bar] });
 
 /**
  * A range that the measurements set, not an error bar that leaves the paper.
@@ -55,7 +52,7 @@ export function parameter({ items, name, pressure, events }) {
   return {
     note: `Value when new ${initial}, total change ${change}, scale ${scale}.`,
     columns: COLUMNS,
-    rows: rowsOf(item),
+    rows: measuredAndTracked(item, "identified", pressure),
     figure: planar("duty cycles", { title: axisOf(name), range: rangeOf(item) }, events, (c) => [
       ...tracked(trajectory, { name: "tracked", line: { color: c.accent, width: 2 } }, c),
       measuredPoints("identified", measured, { color: c.ink }),
@@ -86,9 +83,10 @@ export function landscape({ items, name, cut }) {
   const x = laws.reduce((a, b) => (end(b) > end(a) ? b : a)).cycles;
   const tracking = {
     name: "tracked",
+    points: "identified",
     x,
     y: own.map(({ pressure }) => pressure),
-    values: laws.map((each) => x.map((at) => medianAt(each, at))),
+    values: laws.map(({ cycles, median }) => x.map((at) => between(cycles, median, at))),
     measured: own.flatMap(({ item: { measured }, pressure }) =>
       measured.cycles.map((at, index) => ({ x: at, y: pressure, z: measured.value[index] })),
     ),
@@ -98,17 +96,8 @@ export function landscape({ items, name, cut }) {
   return {
     note: `${PARAMETERS[name].title} at every pressure, tracked over life: lines of equal value, and along the dashed cut. Points: identified from one test each.`,
     columns: COLUMNS,
-    rows: own.flatMap(({ item }) => rowsOf(item)),
+    rows: own.flatMap(({ item, pressure }) => measuredAndTracked(item, "identified", pressure)),
     cuts,
     figure: (c) => contoured([tracking], titles, cuts, c),
   };
-}
-
-/** @type {(law: Trajectory, at: number) => number | null} between the law's points, null past its end; `at`: cycles */
-function medianAt({ cycles, median }, at) {
-  const index = cycles.findIndex((cycle) => cycle >= at);
-  if (index < 0) return null;
-  if (index === 0) return median[0];
-  const share = (at - cycles[index - 1]) / (cycles[index] - cycles[index - 1]);
-  return median[index - 1] + share * (median[index] - median[index - 1]);
 }

@@ -3,7 +3,7 @@
 
 import { fixed } from "../shared/format.js";
 import { named, pressureText, units } from "../shared/units.js";
-import { column, CYCLES, distinct, KIND, torqueColumn } from "./columns.js";
+import { distinct, recordColumns } from "./columns.js";
 import { contoured, cutsOf } from "./contours.js";
 import { pressureRampOf, rampOf } from "./palette.js";
 import { curveOf, inUnit, measuredOf, xyOf } from "./stribeck_law.js";
@@ -15,8 +15,6 @@ import { planar } from "./traces.js";
 /** @typedef {{ tests: StribeckItem[], channels: Record<string, Channels>, clutch: ClutchOut, pressure?: number }} Answers channels by run */
 /** @typedef {{ cycles: number, pressure: number, measured: CurvePoint[], fitted: CurvePoint[] }} Drawn */
 
-const columnsOf = () => [KIND, CYCLES, column("pressure, bar", 2), column("speed, rpm"), torqueColumn()];
-
 /**
  * A few items spread evenly over all, the first and the last among them.
  * @template Item
@@ -27,9 +25,6 @@ export function spread(items, most = 6) {
   if (items.length <= most) return items;
   return Array.from({ length: most }, (_, index) => items[Math.round((index * (items.length - 1)) / (most - 1))]);
 }
-
-/** @param {StribeckItem[]} tests */
-export const pressuresOf = (tests) => distinct(tests.flatMap((test) => test.fits.map((fit) => fit.pressure_bar)));
 
 /**
  * The highest speed of the tests whose records have been read, rpm, and no less than 100.
@@ -87,7 +82,7 @@ export function flat(answers) {
   const label = (curve) => (byState ? `${fixed(curve.cycles)} cycles` : pressureText(curve.pressure));
   return {
     note: `${place} Points: measured. Lines: fitted.${byState && drawn.length < tests.length ? ` ${few}` : ""}`,
-    columns: columnsOf(),
+    columns: recordColumns(),
     rows: rowsOf(drawn),
     figure: planar({ title: "sliding speed, rpm", zero: true }, named(units().torque), [], (c) =>
       drawn.flatMap((curve, index) =>
@@ -150,7 +145,7 @@ export function surface(answers) {
   const cuts = cutsOf(surfaces, titles, cut);
   return {
     note: `${place}: lines of equal torque as fitted${several}, and torque along the dashed cut.`,
-    columns: columnsOf(),
+    columns: recordColumns(),
     rows: rowsOf(drawn),
     cuts,
     figure: (c) => contoured(surfaces, titles, cuts, c),
@@ -164,6 +159,7 @@ function surfaceOf(name, drawn, byPressure) {
     .sort((a, b) => a.y - b.y);
   return {
     name,
+    points: "measured",
     x: xyOf(own[0].fitted).x,
     y: own.map(({ y }) => y),
     values: own.map(({ fitted }) => xyOf(fitted).y),

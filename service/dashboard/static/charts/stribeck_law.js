@@ -8,7 +8,7 @@ const GAMMA = 0.3;
 
 /**
  * Eq. 3: M_s (1 + (M̄_c − 1) exp(−V_S/v)) + C_v v^0.3, Nm at v ≥ 0 m/s; `speed` in rpm.
- * @type {(speed: number, fit: Fit, clutch: Pick<ClutchOut, "geometry">) => number}
+ * @type {(speed: number, fit: Fit, clutch: Shaped) => number}
  */
 export function torqueAtSpeed(speed, { parameters }, clutch) {
   const { static_torque_nm: mS, coulomb_ratio: mC, stribeck_velocity_m_s: vS, viscous_coefficient: cV } = parameters;
@@ -19,7 +19,7 @@ export function torqueAtSpeed(speed, { parameters }, clutch) {
 
 /**
  * The fitted curve of one pressure between two speeds, rpm; closer points near rest, where it is curved most.
- * @type {(fit: Fit, clutch: Pick<ClutchOut, "geometry">, from: number, to: number, count?: number) => CurvePoint[]}
+ * @type {(fit: Fit, clutch: Shaped, from: number, to: number, count?: number) => CurvePoint[]}
  */
 export function curveOf(fit, clutch, from, to, count = 80) {
   return Array.from({ length: count }, (_, index) => {

@@ -43,6 +43,9 @@ type Field = Grid & { name?: string; z: string; levels?: number[]; fill?: (value
 
 /** A line over the whole panel at one x or y, with a text beside it; `turned`: along the line. */
 type Mark = { x?: number; y?: number; line: Line; text: string; turned?: boolean };
+
+/** A clutch, of which only the shape matters. */
+type Shaped = Pick<ClutchOut, "geometry">;
 type Size = { width: number; height: number };
 type Tick = { at: number; text: string };
 

@@ -5,8 +5,8 @@
 import { doubtList } from "../sending/receipt.js";
 import { clutchPath, Problem, readAll, send } from "../shared/api.js";
 import { asked } from "../shared/dialog.js";
-import { button, field, h, select } from "../shared/dom.js";
-import { fixed, kindName, words } from "../shared/format.js";
+import { button, field, h, numberInput, select } from "../shared/dom.js";
+import { fixed, runName, words } from "../shared/format.js";
 import { problemView } from "../shared/problem_view.js";
 
 /** @typedef {"confirm" | "correct" | "reread" | "withdraw" | "restore"} RunAction */
@@ -58,33 +58,39 @@ export function actionsOf({ state, file }) {
   return state === "held" ? ["confirm", ...changes] : changes;
 }
 
-/** @param {Receipt} run */
-const named = (run) => `${kindName(run.kind)} at ${fixed(run.cycles)} cycles`;
-
-/** @param {Receipt} run */
-const pathOf = (run) => `${clutchPath(run.clutch_id)}/runs/${encodeURIComponent(run.run_id)}`;
-
-/** @type {(address: string, value: object, method?: "POST" | "PATCH") => Promise<Receipt>} the answer, where it is a run's */
-async function post(address, value, method = "POST") {
-  /** @type {{ body: Receipt }} */
-  const { body } = await send(method, address, value);
-  return body;
+/**
+ * Change runs of one clutch in one step; their receipts.
+ * @type {(runs: Pick<Receipt, "clutch_id" | "run_id">[], change: Turn | "confirm" | "correct", reason: string, more?: object) => Promise<Receipt[]>}
+ */
+async function changeRuns(runs, change, reason, more = { run_ids: runs.map((run) => run.run_id) }) {
+  return (await send("POST", `${clutchPath(runs[0].clutch_id)}/runs/${change}`, { ...more, reason })).body.items;
 }
 
-/** @param {{ state: string }} run */
-const held = (run) => (run.state === "held" ? " It is held: see its doubts." : "");
+/** @type {(runs: Receipt[]) => string} runs and a verb, as a sentence begins */
+const they = (runs) => (runs.length === 1 ? `${runName(runs[0])} is` : `${runs.length} runs are`);
 
-/** @type {(run: Receipt, cycles: number, reason: string) => Promise<Done>} */
-async function correct(run, cycles, reason) {
-  const after = await post(pathOf(run), { cycles, reason }, "PATCH");
-  const text = `Corrected from ${fixed(run.cycles)} to ${fixed(after.cycles)} cycles.${held(after)}`;
-  return { text, undo: () => correct(after, run.cycles, "the correction is undone") };
+/** @param {{ state: string }[]} changed */
+function held(changed) {
+  if (changed.every(({ state }) => state !== "held")) return "";
+  return changed.length === 1 ? " It is held: see its doubts." : " Some of them are held: see their doubts.";
 }
 
-/** @type {(run: Receipt, reason: string) => Promise<Done>} */
-async function confirm(run, reason) {
-  await post(`${pathOf(run)}/confirm`, { reason });
-  return { text: `${named(run)} is confirmed.`, undo: null };
+/** @type {(runs: Receipt[], cycles: (run: Receipt) => number, reason: string) => Promise<Done>} */
+async function correct(runs, cycles, reason) {
+  const wanted = Object.fromEntries(runs.map((run) => [run.run_id, cycles(run)]));
+  const after = await changeRuns(runs, "correct", reason, { cycles: wanted });
+  const before = new Map(runs.map((run) => [run.run_id, run.cycles]));
+  const one = `Corrected from ${fixed(runs[0].cycles)} to ${fixed(after[0].cycles)} cycles.`;
+  return {
+    text: (runs.length === 1 ? one : `${they(runs)} corrected.`) + held(after),
+    undo: () => correct(after, (run) => before.get(run.run_id) ?? run.cycles, "the correction is undone"),
+  };
+}
+
+/** @type {(runs: Receipt[], reason: string) => Promise<Done>} */
+async function confirm(runs, reason) {
+  await changeRuns(runs, "confirm", reason);
+  return { text: `${they(runs)} confirmed.`, undo: null };
 }
 
 const TURNS = /** @type {const} */ ({
@@ -104,85 +110,59 @@ const TURNS = /** @type {const} */ ({
   },
 });
 
-/** @type {(action: keyof typeof TURNS, address: string, name: string, reason: string) => Promise<Done>} */
-async function turn(action, address, name, reason) {
-  const after = await post(`${address}/${action}`, { reason });
+/** @typedef {keyof typeof TURNS} Turn */
+/** @typedef {{ kind: "run" | "inspection", they: string, make: (turn: Turn, reason: string) => Promise<{ state: string }[]> }} Turned */
+
+/** @type {(turn: Turn, of: Turned, reason: string) => Promise<Done>} */
+async function turn(action, of, reason) {
+  const after = await of.make(action, reason);
   const { past, noun, back } = TURNS[action];
-  const text = `${name} is ${past}.${held(after)}`;
-  return { text, undo: () => turn(back, address, name, `the ${noun} is undone`) };
+  return { text: `${of.they} ${past}.${held(after)}`, undo: () => turn(back, of, `the ${noun} is undone`) };
 }
 
-/** @type {(action: keyof typeof TURNS, kind: "run" | "inspection", address: string, name: string) => Question} */
-const turning = (action, kind, address, name) => ({
-  title: `${words(action)} this ${kind}`,
-  lines: [TURNS[action][kind]],
-  action: words(action),
-  send: (reason) => turn(action, address, name, reason),
+/** @type {(runs: Receipt[]) => Turned} */
+const turned = (runs) => ({
+  kind: "run",
+  they: they(runs),
+  make: (action, reason) => changeRuns(runs, action, reason),
 });
 
-/** @type {(action: keyof typeof TURNS, run: Receipt, reason: string) => Promise<Done>} */
-const turnRun = (action, run, reason) => turn(action, pathOf(run), named(run), reason);
+/** @type {(action: Turn, of: Turned) => Question} */
+const turning = (action, of) => ({
+  title: `${words(action)} this ${of.kind}`,
+  lines: [TURNS[action][of.kind]],
+  action: words(action),
+  send: (reason) => turn(action, of, reason),
+});
 
 /** @type {(run: Receipt) => number | undefined} the cycles that a doubt about a run asks about */
-export const likelyCycles = ({ doubts }) => doubts.find((doubt) => doubt.likely_cycles)?.likely_cycles ?? undefined;
+const likelyCycles = ({ doubts }) => doubts.find((doubt) => doubt.likely_cycles)?.likely_cycles ?? undefined;
 
-/** @typedef {"right" | "likely" | "other"} Answer the run is right, its cycles are those asked about, or it is another clutch's */
+/** @typedef {"right" | "likely" | "other"} Answer the runs are right, their cycles are those asked about, or they are another clutch's */
 
-/** @type {(run: Receipt) => [Answer, string][]} what can be said of a held run with one click: the button's words */
-export function answersOf(run) {
-  const likely = likelyCycles(run);
+/** @type {(runs: Receipt[]) => [Answer, string][]} what can be said of held runs with one click: the button's words */
+export function answersOf(runs) {
+  const [they, likely] =
+    runs.length === 1
+      ? ["It is", `It is ${fixed(likelyCycles(runs[0]))}`]
+      : [`All ${runs.length} are`, `Correct all ${runs.length}`];
   /** @type {[Answer, string][]} */
-  const answers = [["right", "It is right"]];
-  if (likely !== undefined) answers.push(["likely", `It is ${fixed(likely)}`]);
-  return [...answers, ["other", "It is another clutch’s"]];
-}
-
-/** @type {Record<Answer, (run: Receipt) => Promise<Done>>} */
-const ANSWERS = {
-  right: (run) => confirm(run, ""),
-  likely: (run) => correct(run, likelyCycles(run) ?? run.cycles, "wrong cycles, as the doubt suggests"),
-  other: (run) => turnRun("withdraw", run, "another clutch's run"),
-};
-
-/** @type {(runs: Receipt[], change: "confirm" | "withdraw" | "restore", reason: string) => Promise<Receipt>} */
-const changeAll = ([first, ...rest], change, reason) =>
-  post(`${clutchPath(first.clutch_id)}/runs/${change}`, { run_ids: [first, ...rest].map((run) => run.run_id), reason });
-
-/** @type {(runs: Receipt[], cycles: Record<string, number>, reason: string) => Promise<Done>} */
-async function correctAll(runs, cycles, reason) {
-  await post(`${clutchPath(runs[0].clutch_id)}/runs/correct`, { cycles, reason });
-  const before = Object.fromEntries(runs.map((run) => [run.run_id, run.cycles]));
-  const after = runs.map((run) => ({ ...run, cycles: cycles[run.run_id] }));
-  return {
-    text: `${runs.length} runs are corrected.`,
-    undo: () => correctAll(after, before, "the correction is undone"),
-  };
-}
-
-/** @type {(turn: keyof typeof TURNS, runs: Receipt[], reason: string) => Promise<Done>} */
-async function turnAll(turn, runs, reason) {
-  const { past, noun, back } = TURNS[turn];
-  await changeAll(runs, turn, reason);
-  return { text: `${runs.length} runs are ${past}.`, undo: () => turnAll(back, runs, `the ${noun} is undone`) };
+  const answers = [["right", `${they} right`]];
+  if (runs.every((run) => likelyCycles(run) !== undefined)) answers.push(["likely", likely]);
+  return [...answers, ["other", `${they} another clutch’s`]];
 }
 
 /** @type {Record<Answer, (runs: Receipt[]) => Promise<Done>>} */
-const ANSWERS_OF_ALL = {
-  right: async (runs) => {
-    await changeAll(runs, "confirm", "");
-    return { text: `${runs.length} runs are confirmed.`, undo: null };
-  },
-  likely: (runs) => {
-    const cycles = Object.fromEntries(runs.map((run) => [run.run_id, likelyCycles(run) ?? run.cycles]));
-    return correctAll(runs, cycles, "wrong cycles, as the doubt suggests");
-  },
-  other: (runs) => turnAll("withdraw", runs, "another clutch's runs"),
+const ANSWERS = {
+  right: (runs) => confirm(runs, ""),
+  likely: (runs) => correct(runs, (run) => likelyCycles(run) ?? run.cycles, "wrong cycles, as the doubt suggests"),
+  other: (runs) => turn("withdraw", turned(runs), "another clutch's run"),
 };
 
 /** @type {(answer: Answer, runs: Receipt[]) => Promise<Done>} several in one step */
 export async function answerDoubts(answer, runs) {
   try {
-    return await (runs.length > 1 ? ANSWERS_OF_ALL[answer](runs) : ANSWERS[answer](runs[0]));
+    return await ANSWERS[answer](runs);
   } catch (problem) {
     if (!(problem instanceof Problem)) throw problem;
     return { text: `Nothing was changed: ${problem.detail}`, undo: null };
@@ -191,8 +171,7 @@ export async function answerDoubts(answer, runs) {
 
 /** @type {(run: Receipt) => Promise<Question>} */
 async function rereading(run) {
-  /** @type {{ name: string }[]} */
-  const rigs = (await readAll("/v1/rigs")).items;
+  const { items: rigs } = await readAll("/v1/rigs");
   return {
     title: "Read its file again",
     lines: [
@@ -202,8 +181,8 @@ async function rereading(run) {
     action: "Read again",
     choice: { label: "Rig profile", options: rigs.map(({ name }) => [name, name]) },
     send: async (reason, _, rig) => {
-      await post(pathOf(run), { rig, reason }, "PATCH");
-      return { text: `${named(run)} is read by the rig profile ${rig}.`, undo: null };
+      await send("PATCH", `${clutchPath(run.clutch_id)}/runs/${encodeURIComponent(run.run_id)}`, { rig, reason });
+      return { text: `${runName(run)} is read by the rig profile ${rig}.`, undo: null };
     },
   };
 }
@@ -215,7 +194,7 @@ const QUESTIONS = {
     lines: [doubtList(run), "The run is right. From now on it counts like every other run."],
     action: "Confirm",
     optional: true,
-    send: (reason) => confirm(run, reason),
+    send: (reason) => confirm([run], reason),
   }),
   correct: (run) => ({
     title: "Correct the cycles",
@@ -225,11 +204,11 @@ const QUESTIONS = {
     ],
     action: "Correct",
     cycles: likelyCycles(run) ?? run.cycles,
-    send: (reason, cycles) => correct(run, cycles, reason),
+    send: (reason, cycles) => correct([run], () => cycles, reason),
   }),
   reread: rereading,
-  withdraw: (run) => turning("withdraw", "run", pathOf(run), named(run)),
-  restore: (run) => turning("restore", "run", pathOf(run), named(run)),
+  withdraw: (run) => turning("withdraw", turned([run])),
+  restore: (run) => turning("restore", turned([run])),
 };
 
 /**
@@ -240,7 +219,7 @@ const QUESTIONS = {
  */
 export async function askRun(action, run) {
   const question = await QUESTIONS[action](run);
-  const name = h("p", h("b", named(run)), " · ", h("code", run.run_id));
+  const name = h("p", h("b", runName(run)), " · ", h("code", run.run_id));
   return ask({ ...question, lines: [name, ...question.lines] });
 }
 
@@ -248,17 +227,20 @@ export async function askRun(action, run) {
 export const askUndo = (run) =>
   ask({
     title: "Undo the correction",
-    lines: [`${named(run)} goes back to the ${fixed(run.sent_cycles)} cycles that were sent.`],
+    lines: [`${runName(run)} goes back to the ${fixed(run.sent_cycles)} cycles that were sent.`],
     action: "Undo",
-    send: (reason) => correct(run, run.sent_cycles, reason),
+    send: (reason) => correct([run], () => run.sent_cycles, reason),
   });
 
 /** @type {(inspection: InspectionOut) => Asked} withdraw an inspection, or restore it where it was withdrawn */
 export function askInspection({ clutch_id: clutch, inspection_id: id, cycles, state }) {
   const action = state === "withdrawn" ? "restore" : "withdraw";
   const name = `inspection at ${fixed(cycles)} cycles`;
-  const address = `${clutchPath(clutch)}/inspections/${id}`;
-  const question = turning(action, "inspection", address, `The ${name}`);
+  /** @type {Turned["make"]} */
+  const make = async (now, reason) => [
+    (await send("POST", `${clutchPath(clutch)}/inspections/${id}/${now}`, { reason })).body,
+  ];
+  const question = turning(action, { kind: "inspection", they: `The ${name} is`, make });
   return ask({ ...question, lines: [h("p", h("b", words(name))), ...question.lines] });
 }
 
@@ -278,7 +260,7 @@ export const askArchive = (id, archived) =>
 
 /** @type {(id: string, archived: boolean, reason: string) => Promise<Done>} */
 async function archive(id, archived, reason) {
-  await post(clutchPath(id), { archived, reason }, "PATCH");
+  await send("PATCH", clutchPath(id), { archived, reason });
   const text = archived ? `${id} is archived.` : `${id} is back in the list of clutches.`;
   return { text, undo: () => archive(id, !archived, `${archived ? "archiving" : "bringing it back"} is undone`) };
 }
@@ -303,9 +285,9 @@ export const askEnd = (id, cycles) =>
     note: "Note (optional)",
     send: async (note, at, reason) => {
       const end = { kind: "maintenance", event: "end_of_life", cycles: at, reason, note };
-      const run = await post(`${clutchPath(id)}/runs`, end);
-      const text = `${id} is declared ended at ${fixed(run.cycles)} cycles.${held(run)}`;
-      return { text, undo: () => turnRun("withdraw", run, "the declaration is undone") };
+      const { body: run } = await send("POST", `${clutchPath(id)}/runs`, end);
+      const text = `${id} is declared ended at ${fixed(run.cycles)} cycles.${held([run])}`;
+      return { text, undo: () => turn("withdraw", turned([run]), "the declaration is undone") };
     },
   });
 
@@ -316,15 +298,17 @@ export const askTakeBack = (id, end) =>
     lines: [`The life continues after ${fixed(end.cycles)} cycles, and all results are recomputed.`],
     action: "Take it back",
     send: async (reason) => {
-      const run = await post(`${clutchPath(id)}/runs/${encodeURIComponent(end.run_id)}/withdraw`, { reason });
-      return { text: "The declared end is taken back.", undo: () => turnRun("restore", run, "the end holds again") };
+      const runs = await changeRuns([{ clutch_id: id, run_id: end.run_id }], "withdraw", reason);
+      return {
+        text: "The declared end is taken back.",
+        undo: () => turn("restore", turned(runs), "the end holds again"),
+      };
     },
   });
 
 /** @type {(question: Question) => Asked} the question in a dialog */
 function ask({ title, lines, action, optional = false, cycles, choice, note, send }) {
-  const numeric = { type: "number", min: 0, step: "any", required: true, inputmode: "decimal" };
-  const number = h("input", { id: "changed-cycles", value: cycles, ...numeric });
+  const number = numberInput({ id: "changed-cycles", value: cycles, min: 0, required: true });
   const reason = h("input", { id: "reason", required: !optional, maxlength: LONGEST_REASON });
   const chosen = select({ id: "chosen", required: true }, choice?.options ?? [], null);
   const closed = asked({

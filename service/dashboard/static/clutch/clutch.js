@@ -7,7 +7,7 @@ import { alarms } from "../alarms/alarms.js";
 import { pollRaised } from "../alarms/raised.js";
 import { engagementsTab } from "../engagements/engagements.js";
 import { sender } from "../sending/taking.js";
-import { at, Problem, read } from "../shared/api.js";
+import { readIfThere } from "../shared/api.js";
 import { button, byId, h, markShown, redraw, showTab } from "../shared/dom.js";
 import { Live } from "../shared/live.js";
 import { placeUnits } from "../shared/units.js";
@@ -46,17 +46,19 @@ const page = { reader, done };
 /** @type {Record<string, (place: HTMLElement) => Tab>} */
 const TABS = {
   overview: (place) => overviewTab(place, page),
-  diagnosis: () => diagnosisTab(byId("diagnosis-body"), reader, refresh),
-  curves: () => curvesTab(page),
-  loops: () => loopsTab(page),
-  engagements: () => engagementsTab(byId("engagements-charts"), reader),
-  runs: () => runsTab(byId("runs-body"), page),
-  history: () => historyTab(page),
+  diagnosis: (place) => diagnosisTab(place, reader, refresh),
+  curves: (place) => curvesTab(place, page),
+  loops: (place) => loopsTab(place, page),
+  engagements: (place) => engagementsTab(place, reader),
+  runs: (place) => runsTab(place, page),
+  history: (place) => historyTab(place, page),
   alarms: (place) => {
     const show = alarms(place, ID);
     return { show, poll: show };
   },
 };
+
+for (const name of Object.keys(TABS)) byId("main").append(h("div", { id: `tab-${name}`, hidden: true }));
 
 /** @type {Map<string, Tab>} those that were opened */
 const opened = new Map();
@@ -91,15 +93,8 @@ function tab(name) {
 const turn = () => showTab(Object.keys(TABS), wanted().name);
 
 async function poll() {
-  /** @type {{ body: ClutchOut }} */
-  let answer;
-  try {
-    answer = await read(reader.path);
-  } catch (problem) {
-    if (!(problem instanceof Problem && problem.status === 404)) throw problem;
-    showUnregistered();
-    return;
-  }
+  const answer = await readIfThere(reader.path);
+  if (answer === null) return showUnregistered();
   if (answer.body !== reader.clutch) {
     reader.renew(answer.body);
     drawHead(answer.body);
@@ -117,12 +112,11 @@ async function poll() {
 
 /** @param {ClutchOut} clutch */
 function drawHead(clutch) {
-  const copy = () => registerLike(clutch);
   const asks = {
     archive: () => done(askArchive(ID, true)),
     end: endOrTakeBack,
     edit: () => done(editRecord(clutch)),
-    copy,
+    copy: () => registerLike(clutch),
     refresh,
   };
   redraw(byId("head"), ...head(clutch, asks));
@@ -138,9 +132,8 @@ const editRecord = async (clutch) => (await import("../sending/registration.js")
 
 /** @param {ClutchOut} clutch */
 async function registerLike(clutch) {
-  const { copyOf, register } = await import("../sending/registration.js");
-  const id = await register("", { record: copyOf(clutch) });
-  if (id !== null) location.assign(at(`/clutches/${encodeURIComponent(id)}`));
+  const { copyOf, registerAndOpen } = await import("../sending/registration.js");
+  await registerAndOpen(copyOf(clutch));
 }
 
 async function endOrTakeBack() {
@@ -173,12 +166,11 @@ addEventListener("hashchange", () => {
   turn();
   live.now();
 });
-document.addEventListener("unitschange", () => {
+const live = new Live(poll, INTERVAL);
+sender(byId("send"), { clutch: ID, sent: () => live.now() });
+placeUnits(byId("units"), () => {
   shown.clear();
   live.now();
 });
-const live = new Live(poll, INTERVAL);
-sender(byId("send"), { clutch: ID, sent: () => live.now() });
-placeUnits(byId("units"));
 turn();
 live.now();

@@ -1,11 +1,12 @@
 // The tab of the Stribeck curves: curves by state or pressure, as isolines, and their four parameters over cycles and pressure.
 
-import { Chart, chooser, setControls } from "../charts/chart.js";
+import { Chart, chartsOf, chooser, setControls } from "../charts/chart.js";
+import { levelsOf } from "../charts/columns.js";
 import { landscape, parameter, PARAMETER_NAMES, PARAMETERS } from "../charts/parameters.js";
-import { flat, pressuresOf, spread, surface } from "../charts/stribeck.js";
-import { levelOptions, optionsOf, stateOptions, usual } from "../quantities/names.js";
+import { flat, spread, surface } from "../charts/stribeck.js";
+import { levelOptions, ofRun, optionsOf, stateOptions, usual } from "../quantities/names.js";
 import { pressureLaw } from "../quantities/pressure_laws.js";
-import { byId } from "../shared/dom.js";
+import { section } from "../shared/dom.js";
 
 /** @import { ParameterName } from "../charts/parameters.js" */
 /** @import { Depth } from "../charts/stribeck.js" */
@@ -29,21 +30,22 @@ const DEPTHS = [
 
 const NAMES = optionsOf(PARAMETERS);
 
-/** @type {(page: Page) => Tab} */
-export function curvesTab({ reader }) {
-  const { name } = reader;
-  const curves = new Chart({ name, id: "stribeck", title: "Stribeck curves", wide: true, height: 400 });
-  const spatial = new Chart({ name, id: "surface", title: "Lines of equal torque", wide: true, height: 400 });
+/** @type {(place: HTMLElement, page: Page) => Tab} */
+export function curvesTab(place, { reader }) {
+  const curves = new Chart({ id: "stribeck", title: "Stribeck curves", wide: true, height: 400 });
+  const spatial = new Chart({ id: "surface", title: "Lines of equal torque", wide: true, height: 400 });
   const parameters = PARAMETER_NAMES.map((key) => {
     const { title, symbol: letter } = PARAMETERS[key];
-    return { key, chart: new Chart({ name, id: key.replaceAll("_", "-"), title, letter, height: 300 }) };
+    return { key, chart: new Chart({ id: key.replaceAll("_", "-"), title, letter, height: 300 }) };
   });
   const overAll = { id: "landscape", title: "A parameter over cycles and pressure", wide: true };
-  const whole = new Chart({ name, ...overAll, height: 400 });
-  const law = new Chart({ name, id: "pressure-law", title: "A parameter over pressure", height: 360 });
-  byId("stribeck-charts").append(curves.element, spatial.element);
+  const whole = new Chart({ ...overAll, height: 400 });
+  const law = new Chart({ id: "pressure-law", title: "A parameter over pressure", height: 360 });
   const below = [...parameters.map(({ chart }) => chart), whole, law];
-  byId("parameters-charts").append(...below.map(({ element }) => element));
+  place.append(
+    section("stribeck", "Stribeck curves", chartsOf(curves, spatial)),
+    section("parameters", "Stribeck parameters", chartsOf(...below)),
+  );
   /** @type {{ tests: StribeckItem[], items: DegradationItem[], events: Receipt[] }} */
   let answers = { tests: [], items: [], events: [] };
   /** @type {Chosen} */
@@ -54,8 +56,9 @@ export function curvesTab({ reader }) {
   });
   /** @type {(name: "cut" | "parameterCut", spec: Spec) => HTMLElement[]} */
   const cutsOf = (name, { cuts }) => (cuts ? [choose(name, "Cut at", cuts.options, cuts.chosen)] : []);
-  const pressure = () => usual(pressuresOf(answers.tests), chosen.pressure);
-  const level = () => choose("pressure", "Pressure", levelOptions(pressuresOf(answers.tests)), pressure());
+  const levels = () => levelsOf(answers.tests.flatMap(({ fits }) => fits));
+  const pressure = () => usual(levels(), chosen.pressure);
+  const level = () => choose("pressure", "Pressure", levelOptions(levels()), pressure());
 
   async function drawCurves() {
     const ids = answers.tests.map((test) => test.run_id);
@@ -63,7 +66,7 @@ export function curvesTab({ reader }) {
     await reader.records([...spread(ids), ...onSurface, ids.find((id) => id === chosen.run)]);
     const { tests } = answers;
     const { over, by } = chosen; // another one may be chosen by now
-    const run = (tests.find(({ run_id: id }) => id === chosen.run) ?? tests[0])?.run_id;
+    const run = ofRun(tests, chosen.run)?.run_id;
     const shared = { tests, clutch: reader.present(), channels: reader.channels, pressure: pressure(), run };
     const state = () => choose("run", "Cycles", stateOptions(tests), run);
     const more = { pressure: [state], states: [], cycles: [level] }[over];
@@ -85,7 +88,7 @@ export function curvesTab({ reader }) {
     const lines = landscape({ items, name: chosen.parameter, cut: chosen.parameterCut });
     setControls(whole, [choose("parameter", "Parameter", NAMES), ...cutsOf("parameterCut", lines)]);
     whole.show(lines);
-    const test = tests.find(({ run_id: id }) => id === chosen.lawRun) ?? tests[0];
+    const test = ofRun(tests, chosen.lawRun);
     const state = choose("lawRun", "Cycles", stateOptions(tests), test?.run_id);
     setControls(law, tests.length > 0 ? [choose("law", "Parameter", NAMES), state] : []);
     law.show(pressureLaw({ test, name: chosen.law }));

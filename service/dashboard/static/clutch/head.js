@@ -3,7 +3,7 @@
 import { raisedNotices } from "../alarms/raised.js";
 import { limitText, placeText } from "../quantities/criteria.js";
 import { h, menu } from "../shared/dom.js";
-import { fixed, percent, words } from "../shared/format.js";
+import { counted, fixed, percent, words } from "../shared/format.js";
 import { colourOf, heldText, stateIcon } from "../shared/state.js";
 
 /**
@@ -49,7 +49,7 @@ export function head(clutch, { archive, end, edit, copy, refresh }) {
 /** @param {ClutchOut} clutch */
 function description({ friction_material: material, reaction_plate: plate, fluid, geometry, end_of_life: end }) {
   const { inner_diameter_mm: inner, outer_diameter_mm: outer, friction_faces: faces } = geometry;
-  const disc = `${fixed(inner)}/${fixed(outer)} mm, ${faces} ${faces === 1 ? "face" : "faces"}`;
+  const disc = `${fixed(inner)}/${fixed(outer)} mm, ${counted(faces, "face")}`;
   const limits = end.criteria.map((criterion) => `${placeText(criterion)} (${limitText(criterion)})`);
   const limit =
     limits.length > 0

@@ -1,11 +1,11 @@
 // The tab of what has been: remaining life as it was predicted at each test, inspections, and the audit trail (who changed
 // what, when and why; the newest first, page by page).
 
-import { Chart } from "../charts/chart.js";
+import { Chart, chartsOf } from "../charts/chart.js";
 import { remainingCycles } from "../charts/life.js";
 import { inspections } from "../inspections/inspections.js";
 import { clutchPath, readAll } from "../shared/api.js";
-import { button, byId, h, quiet, scrolling, table } from "../shared/dom.js";
+import { button, h, quiet, scrolling, section, table } from "../shared/dom.js";
 import { files } from "../shared/files.js";
 import { fixed, moment, words } from "../shared/format.js";
 import { askInspection } from "./changes.js";
@@ -36,10 +36,9 @@ const ACTIONS = {
 
 /** @type {(place: HTMLElement, clutchId: string) => (runs: Receipt[]) => Promise<void>} reads the pages shown */
 function auditTrail(place, clutchId) {
-  const path = `${clutchPath(clutchId)}/changes`;
+  const path = /** @type {const} */ (`${clutchPath(clutchId)}/changes`);
   let pages = 1;
   return async function show(runs) {
-    /** @type {{ items: Change[], more: boolean }} */
     const { items, more } = await readAll(`${path}?limit=${PAGE}`, pages);
     const named = new Map(runs.map((run) => [run.run_id, run]));
     /** @param {string | null} id */
@@ -89,15 +88,19 @@ function shown(value) {
     .join(", ");
 }
 
-/** @type {(page: Page) => Tab} */
-export function historyTab({ reader, done }) {
-  const { name } = reader;
-  const predicted = new Chart({ name, id: "predicted", title: "Remaining cycles, as predicted", wide: true });
-  byId("predictions-charts").append(predicted.element);
-  const inspected = inspections(byId("inspections-body"), reader, (one) => done(askInspection(one)));
-  const showChanges = auditTrail(byId("changes-body"), reader.id);
+/** @type {(place: HTMLElement, page: Page) => Tab} */
+export function historyTab(place, { reader, done }) {
+  const predicted = new Chart({ id: "predicted", title: "Remaining cycles, as predicted", wide: true });
+  const [inspected, changed] = [h("div"), h("div")];
+  place.append(
+    section("predictions", "Earlier predictions", chartsOf(predicted)),
+    section("inspections", "Inspections", inspected),
+    section("changes", "Changes", changed),
+  );
+  const showInspections = inspections(inspected, reader, (one) => done(askInspection(one)));
+  const showChanges = auditTrail(changed, reader.id);
   /** Inspections come without a change of the clutch. */
-  const poll = async () => inspected(await reader.events());
+  const poll = async () => showInspections(await reader.events());
   const showPredictions = async () => predicted.show(remainingCycles(await reader.forecast()));
   return {
     poll,

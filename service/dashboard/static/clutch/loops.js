@@ -1,14 +1,14 @@
 // The tab of the friction loops: torque over speed by state or pressure, and the lag of friction over cycles and pressure.
 
-import { Chart, chooser, setControls } from "../charts/chart.js";
-import { distinct } from "../charts/columns.js";
-import { loopCurves, loopPressures } from "../charts/loops.js";
+import { Chart, chartsOf, chooser, setControls } from "../charts/chart.js";
+import { distinct, levelsOf } from "../charts/columns.js";
+import { loopCurves } from "../charts/loops.js";
 import { spread } from "../charts/stribeck.js";
 import { LAG_NAMES, lagOverCycles, lagOverPressure } from "../quantities/lag.js";
 import { lazy } from "../quantities/lazy.js";
-import { levelOptions, levelsOf, optionsOf, QUANTITIES, stateOptions, usual } from "../quantities/names.js";
+import { levelOptions, ofRun, optionsOf, QUANTITIES, stateOptions, usual } from "../quantities/names.js";
 import { read } from "../shared/api.js";
-import { byId } from "../shared/dom.js";
+import { offered, section } from "../shared/dom.js";
 import { BY } from "./curves.js";
 
 /** @import { LagName } from "../quantities/lag.js" */
@@ -18,14 +18,13 @@ import { BY } from "./curves.js";
 
 const QUANTITY_OPTIONS = optionsOf(QUANTITIES, LAG_NAMES);
 
-/** @type {(page: Page) => Tab} */
-export function loopsTab({ reader }) {
-  const { name } = reader;
-  const curves = new Chart({ name, id: "loop-curves", title: "Loops: torque over speed", wide: true, height: 420 });
-  const overCycles = new Chart({ name, id: "lag-cycles", title: "Lag over cycles", height: 400 });
-  const overPressure = new Chart({ name, id: "lag-pressure", title: "Lag over pressure", height: 400 });
-  byId("loops-charts").append(curves.element);
-  byId("lag-charts").append(overCycles.element, overPressure.element);
+/** @type {(place: HTMLElement, page: Page) => Tab} */
+export function loopsTab(place, { reader }) {
+  const curves = new Chart({ id: "loop-curves", title: "Loops: torque over speed", wide: true, height: 420 });
+  const overCycles = new Chart({ id: "lag-cycles", title: "Lag over cycles", height: 400 });
+  const overPressure = new Chart({ id: "lag-pressure", title: "Lag over pressure", height: 400 });
+  const lagging = section("lag", "Lag of friction over life", chartsOf(overCycles, overPressure));
+  place.append(section("loops", "Friction loops", chartsOf(curves)), lagging);
   /** @type {{ loops: LoopItem[], tests: StribeckItem[], events: Receipt[] }} */
   let answers = { loops: [], tests: [], events: [] };
   /** @type {DegradationItem[] | null} null: not read yet */
@@ -39,7 +38,7 @@ export function loopsTab({ reader }) {
     } else if (what === "frequency" || what === "lagPressure") drawLag();
     else draw();
   });
-  const lookAtLag = lazy(byId("lag"), [overCycles, overPressure], readLag);
+  const lookAtLag = lazy(lagging, [overCycles, overPressure], readLag);
   const wantLag = () => lookAtLag(`${reader.present().revision} ${chosen.lag}`);
 
   async function draw() {
@@ -47,10 +46,10 @@ export function loopsTab({ reader }) {
     await reader.records([...spread(ids), ids.find((id) => id === chosen.run)]);
     const { loops, tests } = answers;
     const { over } = chosen;
-    const levels = loopPressures(loops);
+    const levels = levelsOf(loops);
     const pressure = levels.find((level) => level === chosen.pressure) ?? levels[Math.floor(levels.length / 2)];
     const runs = [...new Map(loops.map((loop) => [loop.run_id, loop])).values()];
-    const run = (runs.find(({ run_id: id }) => id === chosen.run) ?? runs[0])?.run_id;
+    const run = ofRun(runs, chosen.run)?.run_id;
     const level = choose("pressure", "Pressure", levelOptions(levels), pressure);
     const state = choose("run", "Cycles", stateOptions(runs), run);
     const controls = [choose("over", "Colour by", BY), over === "state" ? level : state];
@@ -61,7 +60,6 @@ export function loopsTab({ reader }) {
 
   async function readLag() {
     const quantity = chosen.lag;
-    /** @type {{ body: { items: DegradationItem[] } }} */
     const { body } = await read(`${reader.path}/degradation?quantity=${quantity}`);
     if (quantity !== chosen.lag) return; // another quantity was chosen meanwhile, and is read next
     lag = body.items;
@@ -76,7 +74,7 @@ export function loopsTab({ reader }) {
     const levels = levelsOf(items);
     const pressure = usual(levels, chosen.lagPressure);
     const quantity = choose("lag", "Quantity", QUANTITY_OPTIONS);
-    const hertz = frequencies.map((hz) => /** @type {[number, string]} */ ([hz, `${hz} Hz`]));
+    const hertz = offered(frequencies, (hz) => `${hz} Hz`);
     const more = [
       choose("frequency", "Frequency", hertz, frequency),
       choose("lagPressure", "Band at", levelOptions(levels), pressure),

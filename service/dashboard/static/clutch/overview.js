@@ -1,17 +1,18 @@
 // The first tab: runs that wait for someone, the state in figures, the forecast with its safe bound, mean COF beside the shudder
 // margin, and what limits the life first.
 
-import { Chart, chooser, setControls } from "../charts/chart.js";
+import { Chart, chartsOf, chooser, setControls } from "../charts/chart.js";
+import { levelsOf } from "../charts/columns.js";
 import { fan } from "../charts/fan.js";
 import { meanCof } from "../charts/life.js";
-import { levelOptions, levelsOf, usual } from "../quantities/names.js";
-import { criteriaTable } from "../quantities/criteria.js";
+import { levelOptions, usual } from "../quantities/names.js";
+import { criteriaTable, predicts } from "../quantities/criteria.js";
 import { lazy } from "../quantities/lazy.js";
 import { remainingBy } from "../quantities/remaining.js";
 import { shudderMargin } from "../quantities/shudder.js";
 import { read } from "../shared/api.js";
 import { h } from "../shared/dom.js";
-import { atLeast, estimate, fixed, likely, percent, probability, roundedDown } from "../shared/format.js";
+import { atLeast, counted, estimate, fixed, likely, percent, probability, roundedDown } from "../shared/format.js";
 import { shareBar } from "../shared/sparkline.js";
 import { colourOf } from "../shared/state.js";
 import { firstRun } from "../shared/welcome.js";
@@ -24,18 +25,17 @@ import { heldView, warningsView } from "./warnings.js";
 /** @type {(place: HTMLElement, page: Page) => Tab} */
 export function overviewTab(place, page) {
   const { reader } = page;
-  const { name } = reader;
-  const forecast = new Chart({ name, id: "fan", title: "Mean COF against its threshold", wide: true, height: 330 });
-  const cof = new Chart({ name, id: "cof", title: "Mean COF by pressure", height: 270 });
-  const shudder = new Chart({ name, id: "shudder", title: "Shudder margin", height: 270 });
+  const forecast = new Chart({ id: "fan", title: "Mean COF against its threshold", wide: true, height: 330 });
+  const cof = new Chart({ id: "cof", title: "Mean COF by pressure", height: 270 });
+  const shudder = new Chart({ id: "shudder", title: "Shudder margin", height: 270 });
   const top = h("div");
   const figures = h("dl.tiles");
   const limits = h("div");
-  const charts = h("div.charts", forecast.element, cof.element, shudder.element);
+  const charts = chartsOf(forecast, cof, shudder);
   const more = h("div.more");
   const body = h("div", { hidden: true }, h("h2.hidden", "Overview"), figures, limits, charts, more);
   place.append(top, body);
-  plannedDuty(more, reader.id);
+  plannedDuty(more, reader.path);
   const showRemaining = remainingBy(more, reader);
   /** @type {{ slopes: DegradationItem[] | null, limits: CriterionOutcome[] | null, counts: boolean }} null: not computed yet */
   let tracked = { slopes: null, limits: null, counts: false };
@@ -78,7 +78,6 @@ export function overviewTab(place, page) {
 
   /** The slopes are shown as soon as they are there; when they reach their limit is computed after that. */
   async function readSlopes() {
-    /** @type {{ body: { items: DegradationItem[] } }} */
     const { body } = await read(`${reader.path}/degradation?quantity=slope`);
     tracked = { slopes: body.items, limits: null, counts: false };
     drawShudder();
@@ -94,11 +93,8 @@ export function overviewTab(place, page) {
   }
 
   /** @param {number} level bar */
-  async function readLimits(level) {
-    /** @type {{ body: RemainingLife }} */
-    const { body } = await read(`${reader.path}/remaining-useful-life?quantity=slope&pressure_bar=${level}`);
-    return body.criteria;
-  }
+  const readLimits = async (level) =>
+    (await read(`${reader.path}/remaining-useful-life?quantity=slope&pressure_bar=${level}`)).body.criteria;
 
   const slopeLevel = () => usual(levelsOf(tracked.slopes ?? []), chosen.level);
 
@@ -121,29 +117,24 @@ function tiles(clutch, life) {
   const [cof, deviation] = estimate(current.mean_cof, current.mean_cof_sd).split(" ± ");
   const share = current.fraction_of_initial;
   const place = share === null ? `at ${fixed(current.measured_at_cycles)} cycles` : `${percent(share, 1)} of new`;
-  const last = share === null ? null : clutch.recent?.mean_cof.at(-1);
-  const used = `${life.runs_used} ${life.runs_used === 1 ? "test" : "tests"} used, ${clutch.runs} runs`;
+  const last = share !== null && clutch.recent?.mean_cof.at(-1);
+  const used = `${counted(life.runs_used, "test")} used, ${counted(clutch.runs, "run")}`;
   const sure = course ? `${probability(course.probability)} sure` : life.runs_used > 2 ? "" : "after three tests";
+  const corrected = model.effects.map((name) => name.replaceAll("_", " ")).join(", ");
   const look = { class: "health", style: colourOf(clutch.state.name) };
   return [
     tile("Health", percent(health), health === null ? null : shareBar(health, look)),
-    tile(
-      predicts(life) ? "Safe for, cycles (95 %)" : "Remaining cycles",
-      remaining(life),
-      h("small", remainingNotes(life)),
-    ),
-    tile(
-      share === null ? "Mean COF, measured" : "Mean COF, tracked",
-      cof,
-      h("small", `${deviation ? `± ${deviation}; ` : ""}${place}`, last ? `; last test ${fixed(last, 4)}` : ""),
-    ),
-    tile("Duty cycles so far", fixed(life.as_of_cycles), h("small", used)),
-    tile("How it ages", course ? COURSES[course.name] : "not known yet", h("small", sure)),
-    tile(
-      "Correction",
-      model.effects.length > 0 ? `For ${model.effects.map((name) => name.replaceAll("_", " ")).join(", ")}` : "None",
-      h("small", model.effects.length > 0 ? "by the adopted diagnosis" : "no diagnosis is adopted"),
-    ),
+    tile(predicts(life) ? "Safe for, cycles (95 %)" : "Remaining cycles", remaining(life), remainingNotes(life)),
+    tile(share === null ? "Mean COF, measured" : "Mean COF, tracked", cof, [
+      deviation && `± ${deviation}; `,
+      place,
+      last ? `; last test ${fixed(last, 4)}` : "",
+    ]),
+    tile("Duty cycles so far", fixed(life.as_of_cycles), used),
+    tile("How it ages", course ? COURSES[course.name] : "not known yet", sure),
+    corrected
+      ? tile("Correction", `For ${corrected}`, "by the adopted diagnosis")
+      : tile("Correction", "None", "no diagnosis is adopted"),
   ];
 }
 
@@ -163,17 +154,14 @@ function remainingNotes(life) {
     never ? `${probability(chance)} chance of an end within ${fixed(life.horizon_cycles)} cycles` : null,
     held ? `if the held ${held.count === 1 ? "run counts" : "runs count"}: ${likely(held.remaining_cycles)}` : null,
     cast && cast.of > 0 ? `${cast.held} of ${cast.of} later tests lay inside their forecast` : null,
-    lives > 0 ? `calibrated on ${lives} ended ${lives === 1 ? "life" : "lives"}` : null,
+    lives > 0 ? `calibrated on ${counted(lives, "ended life", "ended lives")}` : null,
   ]
     .filter((note) => note !== null)
     .join("; ");
 }
 
 /** @type {(name: string, value: string, more: Content) => HTMLElement} */
-const tile = (name, value, more) => h("div.tile", h("dt", name), h("dd", h("span.big", value), more));
-
-/** @param {RemainingLife} life */
-const predicts = ({ status }) => status === "predicted" || status === "may_never_reach";
+const tile = (name, value, more) => h("div.tile", h("dt", name), h("dd", h("span.big", value), h("small", more)));
 
 /** @param {RemainingLife} life */
 function remaining({ status, at_least: bound, ended }) {

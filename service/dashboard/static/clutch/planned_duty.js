@@ -1,9 +1,9 @@
 // Planned duty: a form of blocks and a pace, and the remaining life under them. Nothing of it is stored.
 
-import { clutchPath, Problem, send } from "../shared/api.js";
+import { send } from "../shared/api.js";
 import { button, field, form, h, quiet, scrolling, table } from "../shared/dom.js";
-import { fixed, NOT_A_NUMBER, numberOf, significant, sentence } from "../shared/format.js";
-import { attempted } from "../shared/problem_view.js";
+import { fixed, sentence, significant } from "../shared/format.js";
+import { attempted, numbersOf } from "../shared/problem_view.js";
 
 /** @type {[name: string, label: string, value?: string][]} what is typed of a block; left empty it is not sent */
 const OF_BLOCK = [
@@ -11,28 +11,19 @@ const OF_BLOCK = [
   ["cycles", "Duty cycles", "1000"],
   ["sd", "Standard deviation of this energy, kJ"],
 ];
-const PACE = "pace_cycles_per_hour";
 /** What is shown of the answer's quantiles. */
 const SHOWN = ["0.05", "0.5", "0.95"];
 
-/** Numbers the fields: labels need names of their own. */
-let count = 0;
+/** @type {(name: string, label: string, value?: string) => HTMLElement} a number of the form */
+const entry = (name, label, value = "") => field(h("input", { name, value, inputmode: "decimal" }), label);
 
-/** @type {(name: string, label: string, value?: string) => HTMLElement} a number of the form, below it what is wrong with it */
-function entry(name, label, value = "") {
-  const id = `planned-${(count += 1)}`;
-  const attributes = { inputmode: "decimal", "aria-describedby": `${id}-wrong` };
-  return field(h("input", { id, name, value, ...attributes }), label, h("p.wrong", { id: `${id}-wrong` }));
-}
-
-/** @type {(place: HTMLElement, clutchId: string) => void} */
-export function plannedDuty(place, clutchId) {
-  const address = `${clutchPath(clutchId)}/remaining-useful-life/forecast`;
+/** @type {(place: HTMLElement, clutch: ClutchPath) => void} */
+export function plannedDuty(place, clutch) {
   /** @type {string | undefined} what a planned cycle counts by; undefined: as the service assumes */
   let countedBy;
   /** @type {{ element: HTMLElement, legend: HTMLElement, remove: HTMLElement }[]} */
   let blocks = [];
-  const pace = entry(PACE, "Pace, duty cycles per hour (idle hours included)");
+  const pace = entry("pace_cycles_per_hour", "Pace, duty cycles per hour (idle hours included)");
   const all = h("div.blocks");
   const answer = h("div.answer", { "aria-live": "polite" });
   const go = h("button.main", "Predict");
@@ -70,50 +61,30 @@ export function plannedDuty(place, clutchId) {
     focusLast();
   }
 
+  /** Of a block its number, and the names of its fields as the service's errors have them. */
   function renumber() {
-    for (const [place, { legend, remove }] of blocks.entries()) {
+    for (const [place, { element, legend, remove }] of blocks.entries()) {
       legend.textContent = `Block ${place + 1}`;
       remove.setAttribute("aria-label", `Remove block ${place + 1}`);
       remove.hidden = blocks.length === 1;
+      for (const [index, input] of inputsOf(element).entries()) input.name = `programme/${place}/${OF_BLOCK[index][0]}`;
     }
   }
 
-  /** @type {(pointer: string) => HTMLInputElement | undefined} the number that an error is about; of a whole block its first */
-  function numberAt(pointer) {
-    const [, part, place, name] = pointer.split("/");
-    const within = part === PACE ? pace : blocks[Number(place)]?.element;
-    return within && inputsOf(within).find((input) => name === undefined || input.name === name);
-  }
-
-  async function ask() {
-    const inputs = inputsOf(plan);
-    for (const input of inputs) mark(input, "");
-    for (const input of inputs) if (numberOf(input.value) === undefined) mark(input, NOT_A_NUMBER);
-    answer.replaceChildren();
-    if (focusWrong()) return;
-    await attempted([go], answer, "Computing …", predict, "No prediction. ");
-    focusWrong();
-  }
+  const ask = () => attempted([go], answer, "Computing …", predict, "No prediction. ");
 
   async function predict() {
-    const programme = blocks.map(({ element }) => numbersIn(element));
-    try {
-      /** @type {{ body: PlannedLife }} */
-      const { body } = await send("POST", address, { programme, ...numbersIn(pace), counted_by: countedBy });
-      answer.replaceChildren(...shown(body), other(body));
-    } catch (problem) {
-      const errors = problem instanceof Problem ? problem.errors : [];
-      const elsewhere = errors.filter(({ pointer, message }) => !mark(numberAt(pointer), message));
-      if (errors.length === 0 || elsewhere.length > 0) throw problem;
-      answer.replaceChildren(h("p.notice.bad", { role: "alert" }, "The plan is incomplete: see the marked fields."));
+    const inputs = inputsOf(plan);
+    /** @type {Record<string, number>[]} */
+    const programme = blocks.map(() => ({}));
+    /** @type {Record<string, any>} */
+    const planned = { programme, counted_by: countedBy };
+    for (const [index, number] of numbersOf(inputs).entries()) {
+      const [name, place, part] = inputs[index].name.split("/");
+      if (number !== null) Object.assign(part ? programme[Number(place)] : planned, { [part ?? name]: number });
     }
-  }
-
-  /** Whether a number is wrong: the first that is has the focus then. */
-  function focusWrong() {
-    const first = inputsOf(plan).find((input) => input.hasAttribute("aria-invalid"));
-    first?.focus();
-    return first !== undefined;
+    const { body } = await send("POST", `${clutch}/remaining-useful-life/forecast`, planned);
+    answer.replaceChildren(...shown(body), other(body));
   }
 
   /** @type {(life: PlannedLife) => HTMLElement | string} the other way to count, where the service assumed one */
@@ -132,50 +103,29 @@ export function plannedDuty(place, clutchId) {
 /** @param {HTMLElement} place */
 const inputsOf = (place) => [...place.querySelectorAll("input")];
 
-/** @type {(input: HTMLInputElement | undefined, message: string) => boolean} what is wrong with a number, "": nothing; whether it is known */
-function mark(input, message) {
-  if (!input?.nextElementSibling) return false;
-  input.nextElementSibling.textContent = message.replace(/^programme\S*: /, ""); // the field says where it is
-  if (message) input.setAttribute("aria-invalid", "true");
-  else input.removeAttribute("aria-invalid");
-  return true;
-}
-
-/** @param {HTMLElement} place */
-function numbersIn(place) {
-  const filled = inputsOf(place).filter(({ value }) => value.trim() !== "");
-  return Object.fromEntries(filled.map(({ name, value }) => [name, numberOf(value)]));
-}
-
 /** @param {PlannedLife} life */
 function shown(life) {
-  const {
-    remaining_cycles: cycles,
-    remaining_blocks: blocks,
-    end_of_life_at: dates,
-    recent_duty_cycles: recent,
-  } = life;
+  if (life.status === "insufficient_data") return [h("p.notice", sentence(life.statement))];
   /** @type {(quantiles: Quantiles, decimals: number) => string[]} */
   const numbers = (quantiles, decimals) =>
     SHOWN.map((quantile) => {
       const value = quantiles[quantile] ?? null;
       return value === null ? "over 1,000,000" : fixed(value, decimals);
     });
-  if (life.status === "insufficient_data") return [h("p.notice", sentence(life.statement))];
   const rows = [
-    ["Remaining cycles", ...numbers(cycles, 0)],
-    ["Remaining blocks", ...numbers(blocks, 1)],
-    ["Cycles under recent duty", ...numbers(recent, 0)],
+    ["Remaining cycles", ...numbers(life.remaining_cycles, 0)],
+    ["Remaining blocks", ...numbers(life.remaining_blocks, 1)],
+    ["Cycles under recent duty", ...numbers(life.recent_duty_cycles, 0)],
   ];
-  if (dates !== null && life.counted_from !== null)
+  const { end_of_life_at: dates, counted_from: from } = life;
+  if (dates !== null && from !== null)
     rows.push([
-      `End of life, counted from the last run on ${life.counted_from.slice(0, 10)}`,
+      `End of life, counted from the last run on ${from.slice(0, 10)}`,
       ...SHOWN.map((quantile) => dates[quantile]?.slice(0, 10) ?? "–"),
     ]);
   const columns = ["Probability", ...SHOWN.map((quantile) => `${significant(100 * Number(quantile))} %`)];
-  const notes = life.warnings.map(({ message }) => quiet(message));
   return [
     scrolling("Planned duty", table("Remaining life under planned duty, by probability", columns, rows)),
-    ...notes,
+    ...life.warnings.map(({ message }) => quiet(message)),
   ];
 }

@@ -18,9 +18,6 @@ export class Reader {
     this.channels = {};
   }
 
-  /** The start of saved files' names. */
-  name = () => this.id.replaceAll(/[^\w.-]+/g, "_");
-
   /** @type {(clutch: ClutchOut) => void} the clutch has changed: everything is read again when it is next needed */
   renew(clutch) {
     this.clutch = clutch;
@@ -49,42 +46,34 @@ export class Reader {
   }
 
   /**
-   * @template Item
-   * @param {string} query below the clutch
-   * @returns {Promise<Item[]>}
+   * @template {string} Query
+   * @param {Query} query below the clutch
+   * @returns {Promise<Items<`${ClutchPath}${Query}`>>}
    */
   all(query) {
     return this.once(query, async () => (await readAll(`${this.path}${query}`)).items);
   }
 
-  /** @returns {Promise<RemainingLife>} */
   life = () => this.once("life", async () => (await read(`${this.path}/remaining-useful-life`)).body);
 
-  /** @returns {Promise<Degradation>} */
   degradation = () => this.once("degradation", async () => (await read(`${this.path}/degradation`)).body);
 
-  /** @returns {Promise<StribeckItem[]>} */
   tests = () => this.all("/stribeck?limit=1000");
 
-  /** @returns {Promise<LoopItem[]>} */
   loops = () => this.all("/loops");
 
-  /** @returns {Promise<Receipt[]>} */
   runs = () => this.all("/runs?limit=1000");
 
   /** Maintenance that counts: marks in every chart over cycles. */
   async events() {
-    /** @type {Receipt[]} */
     const runs = await this.all("/runs?kind=maintenance&limit=1000");
     return runs.filter(({ state }) => state === "accepted");
   }
 
-  /** @returns {Promise<Receipt[]>} */
   held = () => this.all("/runs?state=held&limit=1000");
 
   /** @type {() => Promise<Prediction[]>} the earlier predictions of this life's end */
   async predictions() {
-    /** @type {[SeriesItem[], SeriesItem[]]} */
     const [remaining, cof] = await Promise.all([
       this.all("/series?quantity=remaining_cycles"),
       this.all("/series?quantity=mean_cof"),

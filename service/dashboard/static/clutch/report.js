@@ -1,17 +1,17 @@
 // The one-page report: made beside the page whenever it changes, shown in print only, always in the light scheme.
 
 import { sentence } from "../diagnosis/report.js";
-import { byMeanCof } from "../quantities/criteria.js";
+import { byMeanCof, predicts } from "../quantities/criteria.js";
 import { h, table } from "../shared/dom.js";
-import { atLeast, estimate, fixed, likely, moment, percent, probability, words } from "../shared/format.js";
+import { atLeast, counted, estimate, fixed, likely, moment, percent, probability, words } from "../shared/format.js";
 import { stateIcon } from "../shared/state.js";
 
 /** @import { Chart } from "../charts/chart.js" */
 
 /** The service's release, which the page names. */
 const RELEASE = document.querySelector("meta[name=release]")?.getAttribute("content") ?? "";
-const LAST_TESTS = 6;
-const LAST_EVENTS = 6;
+/** Tests and events that are listed. */
+const LAST = 6;
 const COLUMNS = ["Cycles", "Test", "Mean COF, measured", "Fits acceptable"];
 
 /**
@@ -25,8 +25,8 @@ export function makeReport(place, { clutch, life, tests = [], events = [], chart
   const simulated = clutch.origin === "simulated" ? ", simulated" : "";
   const kind = `Wet clutch, ${clutch.friction_material} on ${clutch.reaction_plate}, ${clutch.fluid}${simulated}`;
   const values = life ? facts(clutch, life).flatMap(([name, value]) => [h("dt", name), h("dd", value)]) : [];
-  const last = tests.slice(-LAST_TESTS);
-  const done = events.slice(-LAST_EVENTS).map(({ event, note, cycles: at }) => {
+  const last = tests.slice(-LAST);
+  const done = events.slice(-LAST).map(({ event, note, cycles: at }) => {
     return `${words(event)}${note ? ` (${note.slice(0, 80)})` : ""} at ${fixed(at)} cycles`;
   });
   place.replaceChildren(
@@ -55,7 +55,7 @@ function basis(clutch, life, tests) {
     life ? `${life.method} filter, horizon ${fixed(life.horizon_cycles)} cycles` : "",
     `ageing counted in ${severity.basis.replaceAll("_", " ")}`,
     disc,
-    `revision ${revision} of the clutch's data, ${clutch.runs} runs`,
+    `revision ${revision} of the clutch's data, ${counted(clutch.runs, "run")}`,
     tests.length > 0 ? `tests ${tests[0].run_id} to ${tests[tests.length - 1].run_id}` : "",
   ]
     .filter(Boolean)
@@ -73,19 +73,17 @@ function diagnosisText(latest) {
 function facts(clutch, life) {
   const { current, model } = life;
   const { criterion } = byMeanCof(life);
+  const share = current.fraction_of_initial;
   const predicted = `${atLeast(life.at_least)}; ${likely(life.remaining_cycles)}`;
   const chance = probability(life.probability_of_reaching);
   const cof = estimate(current.mean_cof, current.mean_cof_sd);
   return [
-    ["Remaining cycles", ["predicted", "may_never_reach"].includes(life.status) ? predicted : words(life.status)],
+    ["Remaining cycles", predicts(life) ? predicted : words(life.status)],
     ["Health", percent(current.health)],
-    [
-      current.fraction_of_initial === null ? "Mean COF, measured" : "Mean COF, tracked",
-      current.fraction_of_initial === null ? cof : `${cof} (${percent(current.fraction_of_initial, 1)} of new)`,
-    ],
+    share === null ? ["Mean COF, measured", cof] : ["Mean COF, tracked", `${cof} (${percent(share, 1)} of new)`],
     ["Threshold", `${fixed(criterion.threshold_mean_cof, 4)} (${percent(criterion.fraction)} of new)`],
     ["Duty cycles so far", fixed(life.as_of_cycles)],
-    ["Tests and runs", `${life.runs_used} tests, ${clutch.runs} runs`],
+    ["Tests and runs", `${counted(life.runs_used, "test")}, ${counted(clutch.runs, "run")}`],
     ["Reaches end of life", `${chance} within ${fixed(life.horizon_cycles)} cycles`],
     ["Corrected for", model.effects.length > 0 ? model.effects.map(words).join(", ") : "nothing"],
   ];

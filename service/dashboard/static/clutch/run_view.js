@@ -1,12 +1,12 @@
 // A run opened: its curves with their fits, what the fits leave, and the record as it was sent.
 
-import { Chart, choice, setControls } from "../charts/chart.js";
+import { Chart, chartsOf, choice, setControls } from "../charts/chart.js";
 import { column } from "../charts/columns.js";
 import { pressureRampOf } from "../charts/palette.js";
 import { curvesOfRun } from "../charts/stribeck.js";
 import { measuredOf, torqueAtSpeed } from "../charts/stribeck_law.js";
 import { planar } from "../charts/traces.js";
-import { h } from "../shared/dom.js";
+import { offered } from "../shared/dom.js";
 import { fixed, quantity } from "../shared/format.js";
 import { named, pressureText, units } from "../shared/units.js";
 
@@ -18,22 +18,21 @@ export async function runCharts(run, reader) {
   const channels = reader.channels[run.run_id];
   const names = Object.keys(channels).filter((name) => name !== "time_s" && channels[name].length > 1);
   if (names.length === 0) return null;
-  const name = () => `${reader.name()}-${run.run_id.replaceAll(/[^\w.-]+/g, "_")}`;
   const id = `run-${run.run_id}`;
-  const record = new Chart({ name, id: `${id}-record`, title: "The record as it was sent", height: 300, wide: true });
-  const options = names.map((key) => /** @type {[string, string]} */ ([key, quantity(key)]));
+  const record = new Chart({ id: `${id}-record`, title: "The record as it was sent", height: 300, wide: true });
+  const options = offered(names, quantity);
   const draw = (/** @type {string} */ channel) => {
     setControls(record, [choice("Channel", options, channel, draw)]);
     record.show(recordOf(channels, channel));
   };
   draw(names.includes("torque_nm") ? "torque_nm" : names[0]);
-  if (run.fits.length === 0) return h("div.charts", record.element);
-  const curves = new Chart({ name, id: `${id}-curve`, title: "Curve and fit", height: 300 });
-  const residuals = new Chart({ name, id: `${id}-residuals`, title: "Residuals of the fit", height: 300 });
+  if (run.fits.length === 0) return chartsOf(record);
+  const curves = new Chart({ id: `${id}-curve`, title: "Curve and fit", height: 300 });
+  const residuals = new Chart({ id: `${id}-residuals`, title: "Residuals of the fit", height: 300 });
   const clutch = reader.present();
   curves.show(curvesOfRun(run, channels, clutch));
   residuals.show(residualsOf(run, channels, clutch));
-  return h("div.charts", curves.element, residuals.element, record.element);
+  return chartsOf(curves, residuals, record);
 }
 
 /** @type {(run: Receipt, channels: Channels, clutch: ClutchOut) => Spec} */

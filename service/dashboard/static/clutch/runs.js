@@ -2,9 +2,9 @@
 // by page. `#/runs/RUN` opens one.
 
 import { doubtList, fitTable, loopTable, warnings } from "../sending/receipt.js";
-import { button, h, quiet } from "../shared/dom.js";
+import { button, h, quiet, section } from "../shared/dom.js";
 import { files } from "../shared/files.js";
-import { fixed, kindName, moment, words } from "../shared/format.js";
+import { counted, fixed, kindName, moment, words } from "../shared/format.js";
 import { askUndo, isCorrected, stateMark } from "./changes.js";
 import { buttons } from "./warnings.js";
 import { runCharts } from "./run_view.js";
@@ -14,8 +14,10 @@ import { runCharts } from "./run_view.js";
 /** Runs on a page of the list. */
 const PAGE = 25;
 
-/** @type {(place: HTMLElement, page: Page) => Tab} */
-export function runsTab(place, { reader, done }) {
+/** @type {(tab: HTMLElement, page: Page) => Tab} */
+export function runsTab(tab, { reader, done }) {
+  const place = h("div");
+  tab.append(section("runs", "Runs and events", place));
   let first = 0;
   /** @type {Receipt[]} the latest first */
   let runs = [];
@@ -41,7 +43,7 @@ export function runsTab(place, { reader, done }) {
   function draw() {
     if (first >= runs.length) first = 0;
     const listed = runs.slice(first, first + PAGE).map((run) => item(run));
-    const saved = files(`${reader.name()}-runs`, `${reader.path}/runs.csv`);
+    const saved = files(`${reader.id}-runs`, `${reader.path}/runs.csv`);
     const pages = runs.length > PAGE ? pager() : "";
     place.replaceChildren(quiet(`${countsOf(runs)} `, saved), h("div.runs", listed), pages);
   }
@@ -71,14 +73,13 @@ export function runsTab(place, { reader, done }) {
   function item(run) {
     const inside = h("div.inside");
     const count = run.warnings.length;
-    const warned = count > 0 ? `${count} ${count === 1 ? "warning" : "warnings"}` : "";
     const name = run.state === "withdrawn" ? "s" : "span";
     const summary = h(
       "summary",
       h(name, { class: "number" }, `${fixed(run.cycles)} cycles`),
       h(name, nameOf(run)),
       h("span", stateMark(run) || resultOf(run)),
-      h("span", { class: count > 0 ? "warned" : "quiet" }, warned),
+      h("span", { class: count > 0 ? "warned" : "quiet" }, count > 0 && counted(count, "warning")),
       h("span.quiet", moment(run.started_at ?? run.received_at)),
     );
     const ontoggle = () => {
@@ -120,7 +121,7 @@ export function runsTab(place, { reader, done }) {
 function countsOf(runs) {
   const warned = runs.filter((run) => run.warnings.length > 0).length;
   const [held, withdrawn] = ["held", "withdrawn"].map((state) => runs.filter((run) => run.state === state).length);
-  const parts = [`${runs.length} ${runs.length === 1 ? "run" : "runs"}`, `${warned} with warnings`];
+  const parts = [counted(runs.length, "run"), `${warned} with warnings`];
   if (held > 0) parts.push(`${held} held`);
   if (withdrawn > 0) parts.push(`${withdrawn} withdrawn`);
   return `${parts.join(", ")}.`;
@@ -150,7 +151,7 @@ function resultOf({ kind, fits, loops, duty }) {
     return `${fixed(duty.cycles)} cycles${energy}`;
   }
   if (fits.length > 0) return `${fits.filter((fit) => fit.acceptable).length} of ${fits.length} fits acceptable`;
-  if (loops.length > 0) return `${loops.length} ${loops.length === 1 ? "loop" : "loops"}`;
+  if (loops.length > 0) return counted(loops.length, "loop");
   return kind === "maintenance" ? "" : "no curve";
 }
 

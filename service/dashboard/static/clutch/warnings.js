@@ -3,8 +3,8 @@
 
 import { doubtList } from "../sending/receipt.js";
 import { button, h, quiet } from "../shared/dom.js";
-import { fixed, kindName, moment, sentence, words } from "../shared/format.js";
-import { actionsOf, answerDoubts, answersOf, askRun, LABELS, likelyCycles } from "./changes.js";
+import { counted, moment, runName, sentence, words } from "../shared/format.js";
+import { actionsOf, answerDoubts, answersOf, askRun, LABELS } from "./changes.js";
 
 /** @import { Page } from "./clutch.js" */
 
@@ -56,12 +56,8 @@ export function warningsView(warned, tests) {
   return h("div.notice.odd", h("h2.hidden", "Warnings"), h("ul", items));
 }
 
-/**
- * A run's name that leads to it in the list.
- * @param {{ run_id: string, kind: string, cycles: number }} run
- */
-export const runLink = ({ run_id: id, kind, cycles }) =>
-  h("a", { href: `#/runs/${encodeURIComponent(id)}` }, `${kindName(kind)} at ${fixed(cycles)} cycles`);
+/** @param {{ run_id: string, kind: string, cycles: number }} run its name, which leads to it in the list */
+export const runLink = (run) => h("a", { href: `#/runs/${encodeURIComponent(run.run_id)}` }, runName(run));
 
 /** Held runs that are shown at the top; the others are in the list of runs. */
 const MOST_SHOWN = 5;
@@ -71,7 +67,7 @@ const ABOUT =
 
 /** @type {(runs: Receipt[], page: Page) => HTMLElement} */
 export function heldView(runs, { done }) {
-  const count = runs.length === 1 ? "1 run is held" : `${runs.length} runs are held`;
+  const count = `${counted(runs.length, "run is", "runs are")} held`;
   const rest = runs.length - MOST_SHOWN;
   const listed = runs.slice(0, MOST_SHOWN).map((run) => item(run, done));
   return h(
@@ -91,27 +87,25 @@ function together(runs, done) {
     .map((cause) => runs.filter((run) => run.doubts[0]?.code === cause))
     .filter((alike) => alike.length > 1)
     .map((alike) =>
-      h(
-        "div.row.buttons.start",
-        h("span", `${alike.length} runs for the same reason:`),
-        button(`All ${alike.length} are right`, () => done(answerDoubts("right", alike))),
-        alike.every((run) => likelyCycles(run) !== undefined) &&
-          button(`Correct all ${alike.length}`, () => done(answerDoubts("likely", alike)), { class: "main" }),
-        button(`All ${alike.length} are another clutch’s`, () => done(answerDoubts("other", alike))),
-      ),
+      h("div.row.buttons.start", h("span", `${alike.length} runs for the same reason:`), answers(alike, done)),
     );
 }
 
+/** @type {(runs: Receipt[], done: Page["done"]) => HTMLElement[]} a button for each */
+const answers = (runs, done) =>
+  answersOf(runs).map(([answer, words]) =>
+    button(words, () => done(answerDoubts(answer, runs)), {
+      class: runs.length === 1 || answer === "likely" ? "main" : "",
+    }),
+  );
+
 /** @type {(run: Receipt, done: Page["done"]) => HTMLElement} */
 function item(run, done) {
-  const answers = answersOf(run).map(([answer, words]) =>
-    button(words, () => done(answerDoubts(answer, [run])), { class: "main" }),
-  );
   return h(
     "li",
     h("p", h("b", runLink(run)), h("span.quiet", ` · received ${moment(run.received_at)}`)),
     doubtList(run),
-    h("div.row.buttons.start", answers),
+    h("div.row.buttons.start", answers([run], done)),
     buttons(run, done),
   );
 }

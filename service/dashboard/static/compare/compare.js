@@ -4,13 +4,13 @@
 
 import { pollRaised } from "../alarms/raised.js";
 import { Chart, choice } from "../charts/chart.js";
-import { column, CYCLES, KIND } from "../charts/columns.js";
+import { column, CYCLES, KIND, levelsOf } from "../charts/columns.js";
 import { PARAMETER_NAMES } from "../charts/parameters.js";
 import { spread } from "../charts/stribeck.js";
 import { curveOf, highestOf, xyOf } from "../charts/stribeck_law.js";
 import { planar } from "../charts/traces.js";
-import { levelsOf, optionsOf, QUANTITIES, titleOf, usual } from "../quantities/names.js";
-import { clutchPath, read, readAll } from "../shared/api.js";
+import { optionsOf, QUANTITIES, titleOf, usual } from "../quantities/names.js";
+import { clutchPath, pageOf, read, readAll } from "../shared/api.js";
 import { button, byId, form, h } from "../shared/dom.js";
 import { fixed } from "../shared/format.js";
 import { Live } from "../shared/live.js";
@@ -23,13 +23,13 @@ import { named, placeUnits, pressureText, units } from "../shared/units.js";
 const CHOICES = optionsOf(QUANTITIES, ["mean_cof", ...PARAMETER_NAMES]);
 /** @type {[string, string][]} */
 const VALUES = Object.entries({ share: "normalised to new", measured: "as measured" });
+const NO_TEST = { empty: "None of the compared lives has a stationary test yet." };
 /** How many states of a life are drawn. */
 const STATES = 3;
 const DASHES = /** @type {const} */ ([undefined, "dash", "dot"]);
-const name = () => "comparison";
-const overLife = new Chart({ name, id: "over-life", title: "Over the cycles of each life", wide: true, height: 400 });
+const overLife = new Chart({ id: "over-life", title: "Over the cycles of each life", wide: true, height: 400 });
 const title = "Stribeck curves, first, middle and last test";
-const curves = new Chart({ name, id: "curves", title, wide: true, height: 400 });
+const curves = new Chart({ id: "curves", title, wide: true, height: 400 });
 
 /** What is compared: the address. `clutch=a` is its present life, `clutch=a:1` its first. */
 function question() {
@@ -58,7 +58,6 @@ async function lifeOf(entry, quantity) {
   const [, id, life] = /^(.*?)(?::(\d+))?$/.exec(entry) ?? ["", entry, undefined];
   const path = clutchPath(id);
   const number = life === undefined ? "" : `&life=${life}`;
-  /** @type {[{ body: ClutchOut }, { body: Degradation }, { items: StribeckItem[] }]} */
   const [clutch, degradation, all] = await Promise.all([
     read(path),
     read(`${path}/degradation?quantity=${quantity}${number}`),
@@ -96,7 +95,7 @@ function overLifeOf(lives, quantity, share) {
       { label, points: scaled(measured.cycles, measured.value), line: scaled(trajectory.cycles, trajectory.median) },
     ];
   });
-  if (drawn.length === 0) return { empty: "None of the compared lives has a stationary test yet." };
+  if (drawn.length === 0) return NO_TEST;
   const axis = share ? `${QUANTITIES[quantity].title}, share of new` : titleOf(QUANTITIES[quantity]);
   return {
     note: share
@@ -123,7 +122,7 @@ function overLifeOf(lives, quantity, share) {
 function curvesOf(lives, share) {
   const { torque } = units();
   const drawn = lives.flatMap(({ label, clutch, tests, answer }, index) => {
-    const level = usual((tests[0]?.fits ?? []).map((fit) => fit.pressure_bar));
+    const level = usual(levelsOf(tests[0]?.fits ?? []));
     const fits = spread(tests, STATES).flatMap(({ cycles, fits: all }) => {
       const fit = all.find(({ pressure_bar: bar }) => bar === level);
       return fit ? [{ fit, cycles: cycles - (answer.life.from_cycles ?? 0) }] : [];
@@ -140,7 +139,7 @@ function curvesOf(lives, share) {
       })),
     }));
   });
-  if (drawn.length === 0) return { empty: "None of the compared lives has a stationary test yet." };
+  if (drawn.length === 0) return NO_TEST;
   const axis = share ? "torque, share of the highest when new" : named(torque);
   return {
     note: "Fitted curves, one colour per life: solid for the first test, dashed for the middle one, dotted for the last.",
@@ -173,7 +172,7 @@ function drawForm(lives) {
       });
     return h(
       "li",
-      h("a", { href: `/clutches/${encodeURIComponent(id)}` }, id),
+      h("a", { href: pageOf(id) }, id),
       " ",
       life.clutch.held > 0 && h("span.mark-held", heldText(life.clutch.held)),
       numbers.length > 1 && choice("Life", numbers, `${id}:${life.answer.life.number}`, replace),
@@ -207,10 +206,9 @@ async function poll() {
 
 byId("compared").append(overLife.element, curves.element);
 addEventListener("popstate", () => live.now());
-document.addEventListener("unitschange", () => {
+const live = new Live(poll, 5000);
+placeUnits(byId("units"), () => {
   shown = "";
   live.now();
 });
-const live = new Live(poll, 5000);
-placeUnits(byId("units"));
 live.now();

@@ -18,16 +18,16 @@ const MAPS = [
 const PRESSURE = "pressure, bar";
 
 /**
- * The diagnosis' charts, each with what it shows of a report (null: nothing); `name`: the start of saved files' names.
- * @type {(name: () => string) => { chart: Chart, spec: (report: DiagnosisOut) => Spec | null }[]}
+ * The diagnosis' charts, each with what it shows of a report (null: nothing).
+ * @type {() => { chart: Chart, spec: (report: DiagnosisOut) => Spec | null }[]}
  */
-export function charts(name) {
-  const loops = new Chart({ id: "diagnosis-loops", title: "Loops under both models", name, wide: true, height: 380 });
-  const law = new Chart({ id: "diagnosis-law", title: "The friction law and eq. 3", name, wide: true, height: 380 });
+export function charts() {
+  const loops = new Chart({ id: "diagnosis-loops", title: "Loops under both models", wide: true, height: 380 });
+  const law = new Chart({ id: "diagnosis-law", title: "The friction law and eq. 3", wide: true, height: 380 });
   return [
     { chart: law, spec: (report) => lawSpec(report.law_curves ?? []) },
     ...MAPS.map((map) => ({
-      chart: new Chart({ id: map.id, title: `Residuals over ${map.id.slice(4)} and pressure`, name, height: 330 }),
+      chart: new Chart({ id: map.id, title: `Residuals over ${map.id.slice(4)} and pressure`, height: 330 }),
       spec: (/** @type {DiagnosisOut} */ report) => mapSpec(report.maps, map),
     })),
     { chart: loops, spec: (report) => loopSpec(report.loops ?? []) },

@@ -2,9 +2,10 @@
 // Open this file first, then report.js (a report in words and tables) and charts.js (residuals and loops, before and after);
 // the first also shows remaining life before and after the model changes.
 
+import { chartsOf } from "../charts/chart.js";
 import { read, send } from "../shared/api.js";
 import { agreed } from "../shared/dialog.js";
-import { button, computing, h, quiet } from "../shared/dom.js";
+import { button, computing, h, quiet, section } from "../shared/dom.js";
 import { words } from "../shared/format.js";
 import { attempted } from "../shared/problem_view.js";
 import { charts } from "./charts.js";
@@ -17,16 +18,15 @@ const NEVER_RUN = "No diagnosis has been run yet. It reads the stored runs and c
 /** @param {BeforeAndAfter | null | undefined} life remaining life under both models */
 const nowAndThen = (life) => life && lifeBars(life, ["Now", "Then"]);
 
-/** @typedef {{ path: string, name: () => string }} Named a clutch; `name`: the start of saved files' names */
-/** @typedef {Named & { present: () => Pick<ClutchOut, "runs">, life: () => Promise<RemainingLife> }} Reader of it */
+/** @typedef {{ path: ClutchPath, present: () => Pick<ClutchOut, "runs">, life: () => Promise<RemainingLife> }} Reader of a clutch */
 
 /**
- * @param {HTMLElement} place the section's body
+ * @param {HTMLElement} place of the tab
  * @param {Reader} reader
  * @param {() => Promise<void>} changed hears that the clutch's model is another now
  */
 export function diagnosisTab(place, reader, changed) {
-  const path = `${reader.path}/diagnoses`;
+  const path = /** @type {const} */ (`${reader.path}/diagnoses`);
   /** @type {DiagnosisOut | null} */
   let latest = null;
   /** @type {ModelName | null} under which the clutch is tracked now */
@@ -35,14 +35,15 @@ export function diagnosisTab(place, reader, changed) {
   const run = button("Run the diagnosis", start, { class: "main" });
   const answer = h("div", { role: "status" });
   const content = h("div");
-  const drawings = charts(reader.name);
-  const figures = h("div.charts", { hidden: true }, ...drawings.map(({ chart }) => chart.element));
+  const drawings = charts();
+  const figures = chartsOf(...drawings.map(({ chart }) => chart));
+  figures.hidden = true;
   const buttons = h("div.row.buttons.start", run);
-  place.append(h("div.panel.diagnosis", h("p.question", QUESTION), buttons, answer, content), figures);
+  const panel = h("div.panel.diagnosis", h("p.question", QUESTION), buttons, answer, content);
+  place.append(section("diagnosis", "Diagnosis", panel, figures));
 
   /** Read the newest report where there is another than last time. */
   async function poll() {
-    /** @type {{ body: ListPage<DiagnosisListed>, changed: boolean }} */
     const page = await read(`${path}?limit=1`);
     if (due || page.changed) {
       due = true; // after an error midway too
@@ -55,14 +56,13 @@ export function diagnosisTab(place, reader, changed) {
 
   /** @param {DiagnosisOut} running */
   async function showHowFar({ diagnosis_id: id, created_at: since }) {
-    /** @type {{ body: JobOut }} */
     const { body } = await read(`/v1/jobs/${encodeURIComponent(id)}`);
     const { step, done, of } = body.progress ?? { step: "waiting for its turn", done: null, of: null };
     const count = of ? `, ${done ?? 0} of ${of}` : "";
     computing(content, `the diagnosis (${step}${count})`, Date.parse(since));
   }
 
-  /** @type {(id: string) => Promise<DiagnosisOut>} */
+  /** @param {string} id */
   const report = async (id) => (await read(`${path}/${encodeURIComponent(id)}`)).body;
 
   /** @param {DiagnosisOut | null} found */
@@ -105,10 +105,8 @@ export function diagnosisTab(place, reader, changed) {
 
   function start() {
     return doing("The diagnosis runs; this takes seconds to minutes …", async () => {
-      /** @type {{ status: number, body: DiagnosisOut, location: string | null }} */
-      const answer = await send("POST", path, { adopt: false }, { Prefer: "wait=20" });
-      const { status: code, body, location } = answer;
-      draw(code === 202 ? await finished(location ?? `${path}/${body.diagnosis_id}`) : body);
+      const { status, body, location } = await send("POST", path, { adopt: false }, { Prefer: "wait=20" });
+      draw(status === 202 ? await finished(location ?? `${path}/${body.diagnosis_id}`) : body);
     });
   }
 

@@ -4,9 +4,11 @@ import { clutchPath } from "../shared/api.js";
 import { h, quiet, scrolling, table } from "../shared/dom.js";
 import { files } from "../shared/files.js";
 import {
+  counted,
   cycles,
   fixed,
   interval,
+  median,
   moment,
   percent,
   probability,
@@ -15,7 +17,6 @@ import {
   withSd,
   words,
 } from "../shared/format.js";
-import { VERDICTS } from "../shared/state.js";
 import { intervalBar, shareBar } from "../shared/sparkline.js";
 
 /** @import { Content } from "../shared/dom.js" */
@@ -30,9 +31,6 @@ const SENTENCES = {
   insufficient_data: () => "There is too little data for a verdict.",
 };
 
-/** @type {Record<string, string>} */
-const NOTICES = { model_adequate: "good", cause_named: "bad", cause_ambiguous: "bad", unexplained_structure: "bad" };
-
 const MOST_ROWS = 8;
 /** Other candidates than the first are listed from this probability on, and axes up to this p, as `clutchlife diagnose` does. */
 const [LEAST_PROBABILITY, MOST_P] = [0.05, 0.01];
@@ -43,12 +41,13 @@ export function report(diagnosis) {
     const reason = diagnosis.problem ?? "";
     return [h("p.notice.bad", h("b", "The diagnosis failed. "), reason)];
   }
-  const verdict = diagnosis.verdict ?? "";
+  const { verdict } = diagnosis;
+  const notice = verdict === "model_adequate" ? "good" : verdict === "insufficient_data" ? "" : "bad";
   const date = `${moment(diagnosis.created_at)}, of the runs up to ${cycles(diagnosis.as_of_cycles, 0, 20)} cycles.`;
   return [
     h(
       "div",
-      { class: `notice ${NOTICES[verdict] ?? ""}` },
+      { class: `notice ${notice}` },
       h("p.verdict", h("b", `${heading(diagnosis)}. `), sentence(diagnosis)),
       diagnosis.summary ? h("p", diagnosis.summary) : null,
       quiet(date, outdated(diagnosis)),
@@ -66,7 +65,7 @@ function outdated({ earlier_life: earlier, stale }) {
 /** @typedef {{ verdict: string | null, causes?: string[] }} Judged */
 
 /** @type {(diagnosis: Judged) => string} */
-export const heading = ({ verdict }) => VERDICTS[verdict ?? ""] ?? words(verdict ?? "");
+export const heading = ({ verdict }) => (verdict === "insufficient_data" ? "Too little data" : words(verdict));
 
 /** @type {(diagnosis: Judged) => string} the verdict as a sentence */
 export function sentence({ verdict, causes = [] }) {
@@ -103,7 +102,7 @@ function errorGain(gained) {
     "p",
     { title: scores.filter(Boolean).join("; ") || null },
     h("b", `${fixed(gained.reduction_percent)} % less error`),
-    ` on ${count} ${count === 1 ? "run that was" : "runs that were"} left out of the fit: ${before} → ${after} Nm RMS.`,
+    ` on ${counted(count, "run that was", "runs that were")} left out of the fit: ${before} → ${after} Nm RMS.`,
   );
 }
 
@@ -161,7 +160,7 @@ const PARTS = {
       `The friction curve differs from eq. 3 by ${significant(law.rms_percent, 2)} % RMS (90 %: ${significant(low, 2)} to ${significant(high, 2)} %).`,
       band && `${percent(band.share)} of it lies from ${fixed(band.from_rpm)} to ${fixed(band.to_rpm)} rpm.`,
       law.gain?.reduction_percent != null &&
-        `On runs left out of the fit the curve as found has ${fixed(law.gain.reduction_percent)} % less error than eq. 3.`,
+        `On runs left out of the fit the curve as found has ${law.gain.reduction_percent < 0.5 ? "no" : `${fixed(law.gain.reduction_percent)} %`} less error than eq. 3.`,
       like.length > 0 &&
         `These tests cannot tell this from the form of the curve: ${like.map((cause) => words(cause).toLowerCase()).join(", ")}.`,
     ];
@@ -227,12 +226,7 @@ export function lifeBars({ before, after }, names = ["Before", "After"]) {
   const scale = 1.05 * Math.max(1, ...ends);
   const rows = both.flatMap((q, index) => [
     h("dt", names[index]),
-    h(
-      "dd",
-      h("b", cycles(q["0.5"], q["0.05"], q["0.95"])),
-      h("span.quiet", ` (90 %: ${interval(q)})`),
-      intervalBar(q, scale),
-    ),
+    h("dd", h("b", median(q)), h("span.quiet", ` (90 %: ${interval(q)})`), intervalBar(q, scale)),
   ]);
   return h("dl.lifebars", rows);
 }

@@ -1,22 +1,18 @@
 // The section of the measured engagements: their answer of the API goes in, two charts and the choices above them come out:
 // an indicator over the life, and one engagement beside what the tracked model gives for the same pressure and drive.
 
-import { Chart, chooser, setControls } from "../charts/chart.js";
+import { Chart, chartsOf, chooser, setControls } from "../charts/chart.js";
 import { column, CYCLES, digitsColumn, HALF_OF_90, KIND } from "../charts/columns.js";
 import { measuredLine, planar } from "../charts/traces.js";
 import { INDICATORS, optionsOf, stateOptions, titleOf } from "../quantities/names.js";
-import { clutchPath, Problem, read } from "../shared/api.js";
-import { fixed, percent, significant } from "../shared/format.js";
+import { readIfThere } from "../shared/api.js";
+import { offered, section } from "../shared/dom.js";
+import { fixed, percent, quantity, significant } from "../shared/format.js";
 
-/** The channels of a trace. */
-const CHANNELS = {
-  torque_nm: { title: "Friction torque", unit: "Nm" },
-  speed_rpm: { title: "Sliding speed", unit: "rpm" },
-  pressure_bar: { title: "Line pressure", unit: "bar" },
-};
+const CHANNELS = /** @type {const} */ (["torque_nm", "speed_rpm", "pressure_bar"]);
 
 /** @typedef {keyof typeof INDICATORS} Indicator */
-/** @typedef {keyof typeof CHANNELS} Channel */
+/** @typedef {(typeof CHANNELS)[number]} Channel */
 
 const NO_ENGAGEMENT =
   "No measured engagement yet. Send one with a block of duty: time_s, pressure_bar, speed_rpm and torque_nm of one engagement.";
@@ -43,7 +39,7 @@ function indicatorOverLife({ measured, events, name }) {
 function engagementTrace({ compared, name }) {
   if (compared === null) return { empty: NO_COMPARISON };
   const { channels, model, cycles } = compared;
-  const title = titleOf(CHANNELS[name]);
+  const title = quantity(name);
   const kinds = [{ kind: "measured", trace: channels }, ...(model ? [{ kind: "model", trace: model.channels }] : [])];
   return {
     note: `After ${fixed(cycles)} cycles. ${discrepancyOf(compared)}`,
@@ -77,14 +73,13 @@ function discrepancyOf({ model }) {
 /** @type {Pick<EngagementOut, "measured" | "compared">} */
 const NOTHING = { measured: [], compared: null };
 
-/** @typedef {{ id: string, name: () => string } & Record<"runs" | "events", () => Promise<Receipt[]>>} Reader of a clutch */
+/** @typedef {{ path: ClutchPath } & Record<"runs" | "events", () => Promise<Receipt[]>>} Reader of a clutch */
 
 /** @type {(place: HTMLElement, reader: Reader) => { show: () => Promise<void> }} */
 export function engagementsTab(place, reader) {
-  const { name } = reader;
-  const overLife = new Chart({ name, id: "engagement-indicators", title: "An indicator over cycles", height: 400 });
-  const trace = new Chart({ name, id: "engagement-trace", title: "An engagement against the model", height: 400 });
-  place.append(overLife.element, trace.element);
+  const overLife = new Chart({ id: "engagement-indicators", title: "An indicator over cycles", height: 400 });
+  const trace = new Chart({ id: "engagement-trace", title: "An engagement against the model", height: 400 });
+  place.append(section("engagements", "Engagements", chartsOf(overLife, trace)));
   let answer = NOTHING;
   /** @type {Receipt[]} */
   let events = [];
@@ -98,15 +93,8 @@ export function engagementsTab(place, reader) {
 
   /** The answer; without a stationary test there is no model and none. */
   async function ask() {
-    const run = chosen.run === undefined ? "" : `?run_id=${encodeURIComponent(chosen.run)}`;
-    try {
-      /** @type {{ body: EngagementOut }} */
-      const { body } = await read(`${clutchPath(reader.id)}/engagement${run}`);
-      return body;
-    } catch (problem) {
-      if (problem instanceof Problem && problem.status === 404) return NOTHING;
-      throw problem;
-    }
+    const run = chosen.run === undefined ? "" : `run_id=${encodeURIComponent(chosen.run)}`;
+    return (await readIfThere(`${reader.path}/engagement?${run}`))?.body ?? NOTHING;
   }
 
   function drawOverLife() {
@@ -118,7 +106,7 @@ export function engagementsTab(place, reader) {
   function drawTrace() {
     const { measured, compared } = answer;
     const state = choose("run", "Cycles", stateOptions(measured), compared?.run_id);
-    setControls(trace, compared === null ? [] : [choose("channel", "Channel", optionsOf(CHANNELS)), state]);
+    setControls(trace, compared === null ? [] : [choose("channel", "Channel", offered(CHANNELS, quantity)), state]);
     trace.show(engagementTrace({ compared, name: chosen.channel }));
   }
 

@@ -4,10 +4,10 @@
 
 import { pollRaised, showRaised } from "../alarms/raised.js";
 import { sender } from "../sending/taking.js";
-import { at, clutchPath, read, send } from "../shared/api.js";
+import { clutchPath, read, send } from "../shared/api.js";
 import { agreed } from "../shared/dialog.js";
 import { button, byId, h, markShown, showTab } from "../shared/dom.js";
-import { age } from "../shared/format.js";
+import { age, counted } from "../shared/format.js";
 import { Live } from "../shared/live.js";
 import { problemView } from "../shared/problem_view.js";
 import { stateIcon, STATES } from "../shared/state.js";
@@ -75,10 +75,11 @@ async function poll() {
   }
   const question = chosen();
   const part = rows.wanted();
-  const list = `/v1/clutches?${question}${question && "&"}sort=${SORT.value}&offset=${part.offset}&limit=${part.limit}`;
+  const list = /** @type {const} */ (
+    `/v1/clutches?${question}${question && "&"}sort=${SORT.value}&offset=${part.offset}&limit=${part.limit}`
+  );
   const before = shown;
   shown = ""; // until both are read: an error midway is made good at the next poll
-  /** @type {[{ body: FleetTotals, changed: boolean }, { body: ListPage<ClutchOut>, changed: boolean }]} */
   const [counted, page] = await Promise.all([read(`/v1/fleet/totals?${wanted()}`), read(list)]);
   if (question !== chosen()) return; // what was chosen meanwhile is asked for next
   if (counted.changed || page.changed || before !== list) show(counted.body, page.body.items, part);
@@ -134,7 +135,7 @@ function drawPicked() {
 /** @param {string[]} ids */
 async function archive(ids) {
   const archived = !ARCHIVED.checked;
-  const count = ids.length === 1 ? "1 clutch" : `${ids.length} clutches`;
+  const count = counted(ids.length, "clutch", "clutches");
   const sure = await agreed({
     title: archived ? `Archive ${count}?` : `Bring ${count} back?`,
     points: [
@@ -190,9 +191,7 @@ setInterval(updateAges, 15_000);
 const live = new Live(poll, INTERVAL);
 sender(byId("send"), { sent: () => live.now() });
 byId("register").addEventListener("click", async () => {
-  const { register } = await import("../sending/registration.js");
-  const id = await register("");
-  if (id !== null) location.assign(at(`/clutches/${encodeURIComponent(id)}`));
+  await (await import("../sending/registration.js")).registerAndOpen();
 });
 live.now();
 
@@ -210,9 +209,9 @@ function drawChips(totals) {
     const count = countOf(totals, name);
     if (count === 0 && name !== null && name !== only) return null;
     const pressed = String(only === name);
-    const attributes = { type: "button", class: "chip", "data-state": name ?? "all", "aria-pressed": pressed };
+    const attributes = { class: "chip", "data-state": name ?? "all", "aria-pressed": pressed };
     const icon = name && name !== "held" && stateIcon(name);
-    return h("button", { ...attributes, onclick: () => choose(name) }, icon, h("b", String(count)), ` ${label}`);
+    return button([icon, h("b", String(count)), ` ${label}`], () => choose(name), attributes);
   };
   const focused = document.activeElement instanceof HTMLElement ? document.activeElement.dataset.state : undefined;
   const names = /** @type {StateName[]} */ (Object.keys(STATES));

@@ -1,6 +1,7 @@
 // One clutch in the fleet's table: what it needs first, then what is known of it.
 
 import { raisedLink } from "../alarms/raised.js";
+import { pageOf } from "../shared/api.js";
 import { h } from "../shared/dom.js";
 import { age, cycles, fixed, kindName, likely, percent, roundedDown, words } from "../shared/format.js";
 import { intervalBar, shareBar, sparkline } from "../shared/sparkline.js";
@@ -29,7 +30,7 @@ export function row(clutch, { scale, group, chosen, choose }) {
   const { state, held, summary, alarms } = clutch;
   const box = h("input", { type: "checkbox", checked: chosen, "aria-label": `Choose ${clutch.clutch_id}` });
   box.addEventListener("change", () => choose(box.checked));
-  const address = `/clutches/${encodeURIComponent(clutch.clutch_id)}`;
+  const address = pageOf(clutch.clutch_id);
   const over = clutch.archived || Boolean(summary?.ended);
   const why = state.name === "normal" && !summary?.ended ? null : state.why;
   return h(
@@ -90,13 +91,12 @@ function health({ summary, state }) {
  * @param {number} scale
  */
 function safeFor(summary, scale) {
-  if (summary === null) return cell("safe", {}, "–");
-  const { ended, status, remaining_cycles: q, at_least: bound } = summary;
-  if (ended) return cell("safe", {}, "–");
+  if (!summary || summary.ended) return cell("safe", {}, "–");
+  const { status, remaining_cycles: q, at_least: bound } = summary;
   const few = bound !== null && bound >= 1 && bound < 10;
   const number = h("span.number", few ? "< 10" : roundedDown(Math.max(0, bound ?? 0)));
   if (status === "reached") return cell("safe", {}, number, h("small", "reached"));
-  if (status === "insufficient_data") return cell("safe", {}, number, h("small", "not known yet"));
+  if (status === "insufficient_data") return cell("safe", {}, number, h("small", "end not known yet"));
   const text = likely(q);
   return cell("safe", { title: text }, number, intervalBar(q, scale), h("span.hidden", text));
 }

@@ -2,7 +2,7 @@
 // that a form whose photographs were refused in part is mended and sent once more.
 
 import { send } from "../shared/api.js";
-import { field, form, h, symbol } from "../shared/dom.js";
+import { field, form, h, numberInput, symbol } from "../shared/dom.js";
 import { fixed } from "../shared/format.js";
 import { attempted, problemView } from "../shared/problem_view.js";
 
@@ -15,29 +15,28 @@ const LONGEST_NOTE = 4000;
 /** @type {(name: string, attributes: Record<string, string | number | boolean>) => HTMLInputElement} */
 const input = (name, attributes) => h("input", { id: `inspection-${name}`, name, ...attributes });
 
+/** @type {(name: string, attributes?: Record<string, string | number | boolean>) => HTMLInputElement} */
+const number = (name, attributes) => numberInput({ id: `inspection-${name}`, name, ...attributes });
+
 /** @param {HTMLInputElement} element */
 const numberIn = ({ value }) => (value === "" ? null : Number(value));
 
 /** @type {(inspection: InspectionOut) => HTMLElement} what became of an inspection that was sent */
 function outcomeOf({ cycles, state }) {
-  const named = `The inspection at ${fixed(cycles)} cycles`;
-  return state === "accepted"
-    ? h("p.notice.good", { role: "status" }, `${named} is stored.`)
-    : h(
-        "p.notice.odd",
-        { role: "status" },
-        `${named} was stored earlier and then withdrawn. It stays withdrawn until you restore it in the table.`,
-      );
+  const [kind, outcome] =
+    state === "accepted"
+      ? ["good", "is stored."]
+      : ["odd", "was stored earlier and then withdrawn. It stays withdrawn until you restore it in the table."];
+  return h("p", { class: `notice ${kind}`, role: "status" }, `The inspection at ${fixed(cycles)} cycles ${outcome}`);
 }
 
-/** @type {(path: string, sent: () => Promise<unknown>) => HTMLElement} of the inspections; `sent` hears of stored ones */
+/** @type {(path: `${ClutchPath}/inspections`, sent: () => Promise<unknown>) => HTMLElement} of the inspections; `sent` hears of stored ones */
 export function inspectionForm(path, sent) {
-  const numeric = { type: "number", step: "any", inputmode: "decimal" };
-  const cycles = input("cycles", { ...numeric, min: 0, required: true });
+  const cycles = number("cycles", { min: 0, required: true });
   const moment = input("performed-at", { type: "datetime-local" });
   const lining = input("lining", { maxlength: LONGEST_NAME });
-  const roughness = input("roughness", { ...numeric, min: 0 });
-  const skewness = input("skewness", numeric);
+  const roughness = number("roughness", { min: 0 });
+  const skewness = number("skewness");
   const note = input("note", { maxlength: LONGEST_NOTE });
   const photographs = input("photographs", { type: "file", multiple: true, accept: TYPES.join(",") });
   const answer = h("div.answer", { "aria-live": "polite" });
@@ -57,7 +56,6 @@ export function inspectionForm(path, sent) {
   };
 
   const store = async () => {
-    /** @type {{ body: InspectionOut }} */
     const { body } = await send("POST", path, inspection());
     const refused = [];
     for (const file of photographs.files ?? []) {

@@ -65,13 +65,13 @@ const ABOUT =
 /**
  * Reads the list, and draws it where something is another than before, with events as marks in the charts.
  * @param {HTMLElement} place
- * @param {{ id: string, path: string, name: () => string }} clutch `name`: the start of saved files' names
+ * @param {{ id: string, path: ClutchPath }} clutch
  * @param {(inspection: InspectionOut) => unknown} change asks whether to withdraw an inspection, or to restore it
  */
-export function inspections(place, { id, path, name }, change) {
-  const base = `${path}/inspections`;
-  const roughness = new Chart({ name, id: "roughness", title: "Roughness", letter: ["R", "a"], height: 300 });
-  const skewness = new Chart({ name, id: "skewness", title: "Skewness", letter: ["R", "sk"], height: 300 });
+export function inspections(place, { id, path }, change) {
+  const base = /** @type {const} */ (`${path}/inspections`);
+  const roughness = new Chart({ id: "roughness", title: "Roughness", letter: ["R", "a"], height: 300 });
+  const skewness = new Chart({ id: "skewness", title: "Skewness", letter: ["R", "sk"], height: 300 });
   const charts = h("div.charts", { hidden: true }, roughness.element, skewness.element);
   const list = h("div.inspections");
   const photographs = gallery(base);
@@ -88,7 +88,6 @@ export function inspections(place, { id, path, name }, change) {
   let accepted = null;
 
   async function poll(/** @type {Receipt[]} */ events) {
-    /** @type {{ items: InspectionOut[], changed: boolean }} */
     const { items, changed } = await readAll(`${base}?limit=1000`);
     const different = changed || accepted === null;
     if (different) {
@@ -124,7 +123,7 @@ export function inspections(place, { id, path, name }, change) {
     const label = `${withdrawn ? "Restore" : "Withdraw"} the inspection at ${cycles} cycles`;
     return [
       withdrawn ? [h("s", cycles), " ", mark] : cycles,
-      item.performed_at === null ? "–" : moment(item.performed_at),
+      moment(item.performed_at),
       item.lining || "–",
       significant(item.roughness_um),
       significant(item.skewness),

@@ -3,7 +3,7 @@
 // lazy.js reads an answer that takes seconds when its chart is looked at, and again only when the clutch has changed.
 
 import { h, scrolling, table } from "../shared/dom.js";
-import { cycles, fixed, interval, percent, probability, significant, withSd } from "../shared/format.js";
+import { fixed, interval, median, percent, probability, significant, withSd } from "../shared/format.js";
 import { pressureText } from "../shared/units.js";
 import { QUANTITIES } from "./names.js";
 
@@ -48,10 +48,8 @@ export function reachedText({
   const reaches = `it is reached with a probability of ${probability(chance)}`;
   if (end["0.95"] === 0) return `${level} was already passed when new`;
   if (end["0.5"] === null) return `${level} may never be reached: ${reaches}`;
-  const at = `reached at about ${cycles(end["0.5"], end["0.05"], end["0.95"])} cycles (90 %: ${interval(end)})`;
-  return left["0.5"] === 0
-    ? `${level} has been ${at}`
-    : `${level} is ${at}, ${cycles(left["0.5"], left["0.05"], left["0.95"])} cycles from now`;
+  const at = `reached at about ${median(end)} cycles (90 %: ${interval(end)})`;
+  return left["0.5"] === 0 ? `${level} has been ${at}` : `${level} is ${at}, ${median(left)} cycles from now`;
 }
 
 /** @type {(criterion: CriterionOutcome) => string[]} what is known of a criterion by itself */
@@ -62,11 +60,14 @@ export function criterionRow(criterion) {
     placeText(criterion),
     `${withSd(current.value, current.sd)}${unit && ` ${unit}`}`,
     limitText(criterion),
-    end["0.5"] === null ? "–" : cycles(end["0.5"], end["0.05"], end["0.95"]),
+    median(end),
     interval(end),
     probability(criterion.probability_of_reaching),
   ];
 }
+
+/** @param {RemainingLife} life */
+export const predicts = ({ status }) => status === "predicted" || status === "may_never_reach";
 
 /**
  * What ends the life first: one criterion as a line, several as a table, the most probable first.
@@ -93,19 +94,11 @@ export function byMeanCof(life) {
   if (criteria.length === 0) return life;
   const own = criteria.find(({ quantity, pressure_bar: level }) => quantity === "mean_cof" && level === null);
   if (own) {
-    const { fraction, limit, end_of_life_cycles: end, remaining_cycles: remaining } = own;
+    const { fraction, limit, probability_of_reaching, end_of_life_cycles, remaining_cycles } = own;
     const place = { ...criterion, fraction, threshold_mean_cof: limit };
-    const ahead = remaining["0.5"] === 0 ? "reached" : "predicted";
-    const chance = own.probability_of_reaching;
-    const status = chance === null ? "insufficient_data" : ahead;
-    return {
-      ...life,
-      status,
-      probability_of_reaching: chance,
-      criterion: place,
-      end_of_life_cycles: end,
-      remaining_cycles: remaining,
-    };
+    const ahead = remaining_cycles["0.5"] === 0 ? "reached" : "predicted";
+    const status = probability_of_reaching === null ? "insufficient_data" : ahead;
+    return { ...life, status, criterion: place, probability_of_reaching, end_of_life_cycles, remaining_cycles };
   }
   const never = Object.fromEntries(Object.keys(life.end_of_life_cycles).map((level) => [level, null]));
   const place = { ...criterion, fraction: null, threshold_mean_cof: null };

@@ -4,18 +4,19 @@ import {
   CYCLES,
   digitsColumn,
   distinct,
-  HALF_OF_90,
   intervalColumns,
   KIND,
-  measuredAndLaw,
+  levelsOf,
+  measuredAndTracked,
   PRESSURE,
+  withInterval,
 } from "../charts/columns.js";
 import { rampOf } from "../charts/palette.js";
 import { spread } from "../charts/stribeck.js";
 import { linesByPressure, measuredLine, planar, tracked } from "../charts/traces.js";
 import { fixed } from "../shared/format.js";
 import { pressureText } from "../shared/units.js";
-import { levelsOf, QUANTITIES, titleOf } from "./names.js";
+import { QUANTITIES, titleOf } from "./names.js";
 
 /** @typedef {"loop_area" | "attractor" | "film_time"} LagName */
 
@@ -70,9 +71,7 @@ export function lagOverCycles({ items, name, pressure, events }) {
   return {
     note: `${MEANINGS[name]}; at ${items[0].frequency_hz} Hz, with 90 % error bars. ${more}`,
     columns: columnsOf(name),
-    rows: items.flatMap((item) =>
-      measuredAndLaw(item, { measured: "measured", law: "tracked", before: [item.pressure_bar, item.frequency_hz] }),
-    ),
+    rows: items.flatMap((item) => measuredAndTracked(item, "measured", item.pressure_bar, item.frequency_hz)),
     figure: planar("duty cycles", axisOf(name), events, (c) => [
       ...(course ? track(course, c) : []),
       ...linesByPressure(measuredOf(items), 7, c),
@@ -99,8 +98,7 @@ export function lagOverPressure({ items, name }) {
     note: `${title} at ${items[0].frequency_hz} Hz, from the first dynamic test to the last, with 90 % error bars.`,
     columns: columnsOf(name),
     rows: values.map(({ cycles, pressure, value, sd }) => {
-      const half = HALF_OF_90 * sd;
-      return ["measured", pressure, items[0].frequency_hz, cycles, value, value - half, value + half];
+      return ["measured", pressure, items[0].frequency_hz, cycles, ...withInterval(value, sd)];
     }),
     figure: planar("pressure, bar", axisOf(name), [], (c) =>
       drawn.map((state, index) => {

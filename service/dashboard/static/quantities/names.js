@@ -1,7 +1,7 @@
 // The quantities that are tracked along a life and may end it, and what is chosen of them above charts.
 
-import { distinct } from "../charts/columns.js";
 import { PARAMETERS } from "../charts/parameters.js";
+import { offered } from "../shared/dom.js";
 import { fixed } from "../shared/format.js";
 import { pressureText } from "../shared/units.js";
 
@@ -20,12 +20,17 @@ export function usual(levels, chosen) {
   return levels.length === 0 ? undefined : levels.reduce((a, b) => (distance(b) < distance(a) ? b : a));
 }
 
-/** @type {(items: DegradationItem[]) => number[]} the pressures that quantities are tracked at, bar */
-export const levelsOf = (items) =>
-  distinct(items.flatMap(({ pressure_bar: level }) => (level === null ? [] : [level])));
-
 /** @type {(levels: number[]) => [number, string][]} */
-export const levelOptions = (levels) => levels.map((level) => [level, pressureText(level)]);
+export const levelOptions = (levels) => offered(levels, pressureText);
+
+/**
+ * The one of that run, or the first; undefined where there are none.
+ * @template {{ run_id: string }} Item
+ * @param {Item[]} items
+ * @param {string | undefined} run
+ * @returns {Item | undefined}
+ */
+export const ofRun = (items, run) => items.find(({ run_id: id }) => id === run) ?? items[0];
 
 /** @type {(tests: { run_id: string, cycles: number }[]) => [string, string][]} */
 export const stateOptions = (tests) => tests.map((test) => [test.run_id, `${fixed(test.cycles)} cycles`]);
@@ -72,4 +77,4 @@ export const titleOf = ({ title, unit }) => (unit === "" ? title : `${title}, ${
  * @param {Name[]} names
  */
 export const optionsOf = (quantities, names = /** @type {Name[]} */ (Object.keys(quantities))) =>
-  names.map((name) => /** @type {[Name, string]} */ ([name, quantities[name].title]));
+  offered(names, (name) => quantities[name].title);

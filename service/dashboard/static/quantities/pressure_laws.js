@@ -1,6 +1,6 @@
 // A Stribeck parameter of one test over pressure, its law (fig. 9) and how far the test determines it.
 
-import { column, HALF_OF_90, intervalColumns, KIND } from "../charts/columns.js";
+import { HALF_OF_90, intervalColumns, KIND, PRESSURE, withInterval } from "../charts/columns.js";
 import { axisOf } from "../charts/parameters.js";
 import { measuredPoints, planar, tracked } from "../charts/traces.js";
 import { fixed } from "../shared/format.js";
@@ -9,7 +9,7 @@ import { fixed } from "../shared/format.js";
 
 const POINTS = 60;
 
-const COLUMNS = [KIND, column("pressure, bar", 2), ...intervalColumns("value", 4)];
+const COLUMNS = [KIND, PRESSURE, ...intervalColumns("value", 4)];
 
 /**
  * A law's value at a pressure, bar, and its standard deviation: gᵀ Σ g with the derivatives g by its coefficients.
@@ -47,10 +47,8 @@ export function pressureLaw({ test, name }) {
   const [from, to] = [points[0].pressure, points[points.length - 1].pressure];
   const curve = Array.from({ length: POINTS }, (_, index) => lawAt(law, from + ((to - from) * index) / (POINTS - 1)));
   const shape = "decay_bar" in law ? "falls to an asymptote" : "is a straight line";
-  const rows = [
-    ...points.map((point) => ["identified", ...interval(point)]),
-    ...curve.map((point) => ["law", ...interval(point)]),
-  ];
+  /** @type {(kind: string, drawn: typeof points) => Cell[][]} */
+  const rowsOf = (kind, drawn) => drawn.map(({ pressure, value, sd }) => [kind, pressure, ...withInterval(value, sd)]);
   const edge = (/** @type {number} */ sign) => curve.map(({ value, sd }) => value + sign * HALF_OF_90 * sd);
   const course = { cycles: curve.map(({ pressure }) => pressure), lower: edge(-1), median: edge(0), upper: edge(1) };
   const identified = {
@@ -61,13 +59,10 @@ export function pressureLaw({ test, name }) {
   return {
     note: `After ${fixed(test.cycles)} cycles. Points: identified at each pressure, with 90 % error bars. The law ${shape}; the band around it holds 90 %.`,
     columns: COLUMNS,
-    rows,
+    rows: [...rowsOf("identified", points), ...rowsOf("law", curve)],
     figure: planar("pressure, bar", axisOf(name), [], (c) => [
       ...tracked(course, { name: "law", line: { color: c.accent } }, c),
       measuredPoints("identified", identified, { color: c.ink }),
     ]),
   };
 }
-
-/** @param {{ pressure: number, value: number, sd: number }} point */
-const interval = ({ pressure, value, sd }) => [pressure, value, value - HALF_OF_90 * sd, value + HALF_OF_90 * sd];

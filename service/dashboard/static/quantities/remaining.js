@@ -1,11 +1,11 @@
 // Remaining life by any tracked quantity: a choice of quantity and pressure, answered when it is made. Nothing is stored.
 
 import { chooser, setControls } from "../charts/chart.js";
-import { distinct } from "../charts/columns.js";
+import { levelsOf } from "../charts/columns.js";
 import { PARAMETER_NAMES } from "../charts/parameters.js";
 import { Problem, read } from "../shared/api.js";
 import { computing, h, quiet, scrolling, table } from "../shared/dom.js";
-import { cycles, interval } from "../shared/format.js";
+import { interval, median } from "../shared/format.js";
 import { problemView } from "../shared/problem_view.js";
 import { criterionRow, OWN_COLUMNS } from "./criteria.js";
 import { LAG_NAMES } from "./lag.js";
@@ -26,20 +26,17 @@ const NAMES = optionsOf(QUANTITIES);
  * The levels that a quantity is tracked at, bar; none for those that have no pressure of their own.
  * @type {(name: string, answers: { tests: StribeckItem[], loops: LoopItem[] }) => number[]}
  */
-export function levelsAt(name, { tests, loops }) {
+function levelsAt(name, { tests, loops }) {
   const first = tests.find(({ fits }) => fits.length > 0);
-  if (OF_CURVES.includes(name)) {
-    return distinct((first?.fits ?? []).map(({ pressure_bar: level }) => level));
-  }
-  return OF_LOOPS.includes(name) ? distinct(loops.map(({ pressure_bar: level }) => level)) : [];
+  if (OF_CURVES.includes(name)) return levelsOf(first?.fits ?? []);
+  return OF_LOOPS.includes(name) ? levelsOf(loops) : [];
 }
 
 /** @param {CriterionOutcome[]} criteria */
-export function remainingTable(criteria) {
+function remainingTable(criteria) {
   const rows = criteria.map((criterion) => {
     const { remaining_cycles: left } = criterion;
-    const remaining = left["0.5"] === null ? "–" : cycles(left["0.5"], left["0.05"], left["0.95"]);
-    return [...criterionRow(criterion), remaining, interval(left)];
+    return [...criterionRow(criterion), median(left), interval(left)];
   });
   const columns = [...OWN_COLUMNS, "Remaining cycles", "90 % interval of them"];
   return scrolling(
@@ -51,7 +48,7 @@ export function remainingTable(criteria) {
 /**
  * What is called with the clutch's life and tests whenever they are read.
  * @param {HTMLElement} place
- * @param {{ path: string, loops: () => Promise<LoopItem[]> }} reader of the clutch
+ * @param {{ path: ClutchPath, loops: () => Promise<LoopItem[]> }} reader of the clutch
  */
 export function remainingBy(place, reader) {
   const controls = h("div.row.controls");
@@ -92,12 +89,8 @@ export function remainingBy(place, reader) {
     const wanted = `${revision} ${query}`;
     if (!details.open || wanted === request) return;
     request = wanted;
-    computing(
-      answer,
-      `the remaining life by ${QUANTITIES[/** @type {keyof typeof QUANTITIES} */ (chosen.name)].title.toLowerCase()}`,
-    );
+    computing(answer, `the remaining life by ${QUANTITIES[chosen.name].title.toLowerCase()}`);
     try {
-      /** @type {{ body: RemainingLife }} */
       const { body } = await read(`${reader.path}/remaining-useful-life?${query}`);
       if (wanted === request) answer.replaceChildren(remainingTable(body.criteria));
     } catch (problem) {

@@ -1,6 +1,6 @@
 // The shudder margin: the slope dμ/dv of the fitted curves over cycles. Below zero friction falls with speed.
 
-import { CYCLES, column, intervalColumns, KIND, measuredAndLaw, PRESSURE } from "../charts/columns.js";
+import { column, CYCLES, intervalColumns, KIND, measuredAndTracked, PRESSURE } from "../charts/columns.js";
 import { measuredPoints, planar, tracked } from "../charts/traces.js";
 import { fixed } from "../shared/format.js";
 import { pressureText } from "../shared/units.js";
@@ -27,9 +27,7 @@ export function shudderMargin({ items, limits, counts, events }) {
   return {
     note: `At ${pressureText(items[0].pressure_bar)}. Below the dashed line friction falls with speed, and the driveline may shudder. ${when}`,
     columns: COLUMNS,
-    rows: items.flatMap((item) =>
-      measuredAndLaw(item, { measured: "measured", law: "tracked", before: [item.pressure_bar, item.speed_rpm] }),
-    ),
+    rows: items.flatMap((item) => measuredAndTracked(item, "measured", item.pressure_bar, item.speed_rpm)),
     figure: planar("duty cycles", "dμ/dv, s/m", events, (c) => [
       ...items.flatMap((item, index) => slopeTraces(item, [c.accent, c.check, c.normal][index % 3], c)),
       zeroLine(items, c),

@@ -1,7 +1,7 @@
 // The criteria that end a clutch's life, as rows of a form: a quantity, where it is measured, its limit.
 
-import { QUANTITIES } from "../quantities/names.js";
-import { button, h, quiet, select } from "../shared/dom.js";
+import { optionsOf, QUANTITIES } from "../quantities/names.js";
+import { button, h, numberInput, quiet, select } from "../shared/dom.js";
 
 /** @type {[string, string][]} */
 const LIMITS = [
@@ -10,8 +10,7 @@ const LIMITS = [
   ["above", "above"],
 ];
 const PLACES = /** @type {const} */ ({ pressure_bar: "bar", speed_rpm: "rpm", frequency_hz: "Hz" });
-/** @type {[string, string][]} */
-const NAMES = Object.entries(QUANTITIES).map(([name, { title }]) => [name, title]);
+const NAMES = optionsOf(QUANTITIES);
 
 /**
  * The rows, and what they say.
@@ -22,21 +21,20 @@ export function criteriaForm(criteria) {
   /** @type {Map<HTMLElement, () => object>} */
   const rows = new Map();
   const list = h("div");
-  /** @param {Partial<CriterionIn>} criterion */
+  /** @param {Record<string, any>} criterion */
   const add = (criterion) => {
     const quantity = select({ "aria-label": "Quantity" }, NAMES, criterion.quantity);
-    const side = LIMITS.find(([name]) => typeof (/** @type {any} */ (criterion)[name]) === "number")?.[0];
+    const side = LIMITS.find(([name]) => typeof criterion[name] === "number")?.[0];
     const limit = select({ "aria-label": "Kind of limit" }, LIMITS, side);
-    const numbers = { type: "number", step: "any", size: 6 };
-    const value = h("input", {
-      ...numbers,
+    const value = numberInput({
+      size: 6,
       required: true,
       "aria-label": "Limit",
-      value: side === undefined ? "" : /** @type {any} */ (criterion)[side],
+      value: side === undefined ? "" : criterion[side],
     });
     const places = Object.entries(PLACES).map(([name, unit]) => {
-      const at = /** @type {any} */ (criterion)[name] ?? "";
-      return { name, input: h("input", { ...numbers, placeholder: unit, "aria-label": unit, value: at }) };
+      const at = criterion[name] ?? "";
+      return { name, input: numberInput({ size: 6, placeholder: unit, "aria-label": unit, value: at }) };
     });
     const remove = () => {
       rows.delete(row);

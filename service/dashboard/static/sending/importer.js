@@ -4,12 +4,12 @@
 import { drawnAlone } from "../charts/draw.js";
 import { band, planar } from "../charts/traces.js";
 import { send } from "../shared/api.js";
-import { button, field, h, quiet, scrolling, select } from "../shared/dom.js";
+import { button, field, h, numberInput, offered, quiet, scrolling, select } from "../shared/dom.js";
 import { quantity, words } from "../shared/format.js";
 import { problemView } from "../shared/problem_view.js";
 import { warnings } from "./receipt.js";
 
-/** @import { Content } from "../shared/dom.js" */
+/** @import { Attributes, Content } from "../shared/dom.js" */
 /** @typedef {{ names: string[], readings: () => Importer[] }} Together the files that were dropped together */
 /** @typedef {ReturnType<typeof importer>} Importer */
 
@@ -145,67 +145,58 @@ export function importer(file, number, run, together) {
 
   /** @param {Preview} shown */
   function columnsTable({ columns, first_rows: rows, units }) {
-    /** @type {(name: string, cell: (column: PreviewColumn, index: number) => Content) => HTMLElement} */
-    const line = (name, cell) => {
-      const cells = columns.map((column, index) => h("td", cell(column, index)));
-      return h("tr", h("th", { scope: "row" }, name), cells);
-    };
-    const choices = [
-      line("Channel", (column, index) => channel(column, index, Object.keys(units))),
-      line("Unit", (column, index) => unit(column, index, units[column.channel ?? ""] ?? [])),
-      line("Scale", (column, index) => factor(column, index, "scale")),
-      line("Offset", (column, index) => factor(column, index, "offset")),
-    ];
-    const first = rows.slice(0, ROWS).map((row, index) => line(`Row ${index + 1}`, (_, at) => row[at] ?? ""));
+    /** @type {(name: string, cells: Content[]) => HTMLElement} */
+    const line = (name, cells) =>
+      h(
+        "tr",
+        h("th", { scope: "row" }, name),
+        cells.map((cell) => h("td", cell)),
+      );
+    const chosen = columns.map((column, index) => choices(column, index, units));
+    const choosing = ["Channel", "Unit", "Scale", "Offset"].map((name, at) =>
+      line(
+        name,
+        chosen.map((column) => column[at]),
+      ),
+    );
+    const first = rows.slice(0, ROWS).map((row, at) =>
+      line(
+        `Row ${at + 1}`,
+        columns.map((_, index) => row[index] ?? ""),
+      ),
+    );
     const titles = columns.map(({ title }) => h("th", { scope: "col" }, title));
     const caption = h("caption.hidden", `First rows of ${file.name}`);
     const head = h("thead", h("tr", h("th", { scope: "row" }, "Column"), titles));
-    return scrolling("First rows", h("table.columns", caption, head, h("tbody", choices, first)));
+    return scrolling("First rows", h("table.columns", caption, head, h("tbody", choosing, first)));
   }
 
-  /** @type {(column: PreviewColumn, index: number, channels: string[]) => HTMLElement} */
-  function channel(column, index, channels) {
-    const options = channels.map((name) => /** @type {[string, string]} */ ([name, quantity(name)]));
-    const attributes = cell(column, index, "channel", (value, columns) => {
+  /** @type {(column: PreviewColumn, index: number, units: Record<string, string[]>) => Content[]} channel, unit, scale, offset */
+  function choices(column, index, units) {
+    const { title, channel, unit, stated_unit: stated } = column;
+    /** @type {(name: string, change: (value: string | null, columns: RigColumn[]) => Partial<RigColumn>) => Attributes} */
+    const attributes = (name, change) => ({
+      id: `import-${number}-${name}-${index}`,
+      "aria-label": `${words(name)} of ${title}`,
+      onchange: ({ target }) =>
+        edit(({ columns }) => Object.assign(columns[index], change(target.value || null, columns))),
+    });
+    const taking = attributes("channel", (value, columns) => {
       for (const other of columns) if (other.channel === value) Object.assign(other, { channel: null, unit: null });
       return { channel: /** @type {RigColumn["channel"]} */ (value), unit: null, stated: null };
     });
-    const list = select(attributes, [["", "left out"], ...options], column.channel ?? "");
-    return list;
-  }
-
-  /** @type {(column: PreviewColumn, index: number, units: string[]) => HTMLSelectElement | string} */
-  function unit(column, index, units) {
-    const { channel, unit, stated_unit: stated } = column;
-    if (channel === null) return stated ?? "";
-    const names = unit !== null && !units.includes(unit) ? [unit, ...units] : units;
-    const options = names.map((name) => /** @type {[string, string]} */ ([name, name]));
-    if (unit === null) options.unshift(["", "choose …"]);
-    return select(
-      cell(column, index, "unit", (value) => ({ unit: value, stated })),
-      options,
-      unit,
-    );
-  }
-
-  /** @type {(column: PreviewColumn, index: number, name: "scale" | "offset") => HTMLInputElement | string} */
-  function factor(column, index, name) {
-    if (column.channel === null) return "";
-    const attributes = cell(column, index, name, (value) => ({ [name]: Number(value) }));
-    return h("input", { ...attributes, type: "number", step: "any", required: true, value: column[name] });
-  }
-
-  /**
-   * Of what is chosen of a column; `change` gives what the profile then says of it.
-   * @param {PreviewColumn} column
-   * @param {number} index
-   * @param {string} name
-   * @param {(value: string | null, columns: RigColumn[]) => Partial<RigColumn>} change
-   */
-  function cell({ title }, index, name, change) {
-    const onchange = (/** @type {any} */ event) =>
-      edit(({ columns }) => Object.assign(columns[index], change(event.target.value || null, columns)));
-    return { id: `import-${number}-${name}-${index}`, "aria-label": `${words(name)} of ${title}`, onchange };
+    const list = select(taking, [["", "left out"], ...offered(Object.keys(units), quantity)], channel ?? "");
+    if (channel === null) return [list, stated ?? "", "", ""];
+    const known = units[channel] ?? [];
+    const names = unit === null ? ["", ...known] : known.includes(unit) ? known : [unit, ...known];
+    const measured = attributes("unit", (value) => ({ unit: value, stated }));
+    /** @param {"scale" | "offset"} name */
+    const factor = (name) => {
+      const scaled = attributes(name, (value) => ({ [name]: Number(value) }));
+      return numberInput({ ...scaled, required: true, value: column[name] });
+    };
+    const unitOptions = offered(names, (name) => name || "choose …");
+    return [list, select(measured, unitOptions, unit), factor("scale"), factor("offset")];
   }
 
   /** @param {Preview} shown */
@@ -218,7 +209,7 @@ export function importer(file, number, run, together) {
       },
     });
     const marks = Object.entries({ "": "found", ",": "comma: 1.234,5", ".": "point: 1,234.5" });
-    const sheets = ["", ...tables].map((name) => /** @type {[string, string]} */ ([name, name || "the only one"]));
+    const sheets = offered(["", ...tables], (name) => name || "the only one");
     const missing = h("input", { ...attributes("missing"), value: profile.missing ?? "" });
     const good = h("input", { ...attributes("good"), value: profile.good ?? "" });
     const asked = profile.good !== null || problem?.includes("good=");

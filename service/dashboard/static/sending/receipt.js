@@ -2,7 +2,7 @@
 
 import { drawnAlone } from "../charts/draw.js";
 import { curvesOfRun } from "../charts/stribeck.js";
-import { clutchPath, read, readDrawn } from "../shared/api.js";
+import { clutchPath, pageOf, read, readDrawn } from "../shared/api.js";
 import { h, scrolling, symbol, table } from "../shared/dom.js";
 import { cycles, fixed, kindName, sentence, significant, withSd, words } from "../shared/format.js";
 
@@ -24,7 +24,7 @@ export function outcomeOf(receipt) {
     if (event.target instanceof Element) event.target.closest("dialog")?.close();
   };
   const [words, section, change] = UNCOUNTED[state];
-  const link = h("a", { href: `/clutches/${encodeURIComponent(clutchId)}${section}`, onclick: close }, change);
+  const link = h("a", { href: pageOf(clutchId) + section, onclick: close }, change);
   return h("div.notice.odd", name, held && doubtList(receipt), h("p", words, link));
 }
 
@@ -113,7 +113,6 @@ export function loopTable(loops) {
 /** @type {(receipt: Receipt) => Promise<SVGSVGElement | null>} the measured points and the fitted curves */
 async function drawing(receipt) {
   const { clutch_id: clutchId, run_id: runId, fits } = receipt;
-  /** @type {[{ body: RunOut }, { body: ClutchOut }]} */
   const [run, clutch] = await Promise.all([readDrawn(clutchId, runId), read(clutchPath(clutchId))]);
   const { figure, rows = [] } = curvesOfRun(receipt, run.body.channels, clutch.body);
   const points = rows.filter(([kind]) => kind === "measured").length;

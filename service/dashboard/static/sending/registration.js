@@ -1,9 +1,9 @@
 // A clutch is registered, or its record edited, by a form that is submitted, never by a name that was typed: all its values are
 // shown first.
 
-import { clutchPath, send } from "../shared/api.js";
+import { at, clutchPath, pageOf, send } from "../shared/api.js";
 import { asked } from "../shared/dialog.js";
-import { button, field, h, quiet } from "../shared/dom.js";
+import { button, field, h, numberInput, quiet } from "../shared/dom.js";
 import { criteriaForm } from "./criteria_form.js";
 
 /** @import { Done } from "../clutch/changes.js" */
@@ -159,13 +159,19 @@ export async function register(id, { similar = [], record = null, lead = "" } = 
   return meant ?? registered;
 }
 
+/** @type {(record?: ClutchRecord) => Promise<void>} register a clutch, and open its page */
+export async function registerAndOpen(record) {
+  const id = await register("", { record });
+  if (id !== null) location.assign(at(pageOf(id)));
+}
+
 /** @type {(field: Field, record: ClutchRecord | null) => HTMLInputElement} */
 function inputOf([path, , usual, attributes], record) {
   const own = path.split(".").reduce((value, name) => value?.[name], /** @type {any} */ (record));
-  const kind =
-    typeof usual === "string" ? { maxlength: 100 } : { type: "number", step: "any", min: 0, inputmode: "decimal" };
-  const all = { required: true, value: own ?? usual ?? "", ...kind, ...attributes };
-  return h("input", { id: `new-${path.replace(".", "-")}`, ...all });
+  const all = { id: `new-${path.replace(".", "-")}`, required: true, value: own ?? usual ?? "" };
+  return typeof usual === "string"
+    ? h("input", { ...all, maxlength: 100, ...attributes })
+    : numberInput({ ...all, min: 0, ...attributes });
 }
 
 /** @type {(inputs: [string, HTMLInputElement][], record: ClutchRecord | null, criteria: object[]) => Record<string, any>} */

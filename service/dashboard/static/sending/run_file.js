@@ -1,8 +1,8 @@
 // One file that is to be sent: what it is, as far as it or its name says so; and what the service made of it.
 
 import { clutchPath, Problem, send } from "../shared/api.js";
-import { field, h, quiet, select } from "../shared/dom.js";
-import { fixed, kindName } from "../shared/format.js";
+import { field, h, numberInput, offered, quiet, select } from "../shared/dom.js";
+import { kindName, runName } from "../shared/format.js";
 import { problemView } from "../shared/problem_view.js";
 import { importer } from "./importer.js";
 import { outcomeOf, receiptView } from "./receipt.js";
@@ -11,12 +11,8 @@ import { outcomeOf, receiptView } from "./receipt.js";
 /** @import { Together } from "./importer.js" */
 
 /** @typedef {Record<string, string>} Listed what a list of runs (`runs.json`) says of a file */
-/** @type {[string, string][]} */
-const KINDS = [
-  ["", "choose …"],
-  ["stationary_stribeck", kindName("stationary_stribeck")],
-  ["dynamic_stribeck", kindName("dynamic_stribeck")],
-];
+const KINDS = offered(["", "stationary_stribeck", "dynamic_stribeck"], (name) => (name ? kindName(name) : "choose …"));
+export const SUGGESTED = "suggested by the files’ names and title blocks";
 /** Larger JSON is not read here; the service would not take it either. */
 export const MOST_JSON_BYTES = 64 * 2 ** 20;
 /** Tries while the service is busy, and the wait before each, seconds. Chosen: a busy minute. */
@@ -35,15 +31,14 @@ let count = 0;
 export function runFile(file, json, together, listed) {
   const number = (count += 1);
   const kind = select({ id: `kind-${number}`, required: true }, KINDS, listed?.kind ?? "");
-  const numeric = { type: "number", min: 0, step: "any", required: true, inputmode: "decimal" };
-  const cycles = h("input", { id: `cycles-${number}`, value: listed?.cycles ?? "", ...numeric });
+  const cycles = numberInput({ id: `cycles-${number}`, value: listed?.cycles ?? "", min: 0, required: true });
   let clutch = "";
   const hints = { kind: h("small"), cycles: h("small") };
   /** @type {(field: HTMLInputElement | HTMLSelectElement, hint: HTMLElement, value: string) => void} until it is changed */
   const suggest = (field, hint, value) => {
     if (field.value !== "") return;
     field.value = value;
-    hint.textContent = "suggested by the files’ names and title blocks";
+    hint.textContent = SUGGESTED;
     field.addEventListener("input", () => hint.replaceChildren(), { once: true });
   };
   /** What the names and the cells above the tables suggest is filled in where nothing is. */
@@ -58,7 +53,7 @@ export function runFile(file, json, together, listed) {
   const remark = h("p.remark", { role: "status" });
   const asked = [field(kind, "Kind of test", hints.kind), field(cycles, "Duty cycles since new", hints.cycles)];
   const fields = h("fieldset.fields", json ? null : asked);
-  const says = json ? ` · ${kindName(json.kind)} at ${fixed(json.cycles)} cycles` : "";
+  const says = json ? ` · ${runName(json)}` : "";
   const element = h(
     "div.file",
     { role: "group", "aria-label": file.name },
@@ -84,28 +79,23 @@ export function runFile(file, json, together, listed) {
 
   /** @type {(id: string) => Promise<Receipt>} */
   async function store(id) {
-    /** @type {{ body: Receipt }} */
-    let answer;
     if (json) {
       const { clutch_id: _, ...run } = JSON.parse(await file.text());
-      answer = await send("POST", `${clutchPath(id)}/runs`, run);
-    } else {
-      const sent = reading?.sent() ?? file;
-      /** @type {Record<string, string>} */
-      const headers = sent === file ? { "Content-Type": "application/octet-stream" } : {};
-      answer = await send("POST", address(id), sent, headers);
+      return (await send("POST", `${clutchPath(id)}/runs`, run)).body;
     }
-    return answer.body;
+    const sent = reading?.sent() ?? file;
+    /** @type {Record<string, string>} */
+    const headers = sent === file ? { "Content-Type": "application/octet-stream" } : {};
+    return (await send("POST", `${clutchPath(id)}/runs/file?${question()}`, sent, headers)).body;
   }
 
-  /** @param {string} id */
-  function address(id) {
+  function question() {
     const { run_id, origin, started_at, map } = listed ?? {};
     const query = new URLSearchParams({ kind: kind.value, cycles: cycles.value });
     query.set("filename", file.name.slice(-200));
     const more = { map, rig: reading?.rig(), time: reading?.time(), run_id, origin, started_at };
     for (const [key, value] of Object.entries(more)) if (value) query.set(key, value);
-    return `${clutchPath(id)}/runs/file?${query}`;
+    return query;
   }
 
   const run = {

@@ -3,11 +3,12 @@
 // importer.js (how it is read), registration.js (a clutch that is not known yet) and
 // receipt.js (what the service made of a run).
 
-import { clutchPath, Problem, read } from "../shared/api.js";
+import { clutchPath, pageOf, readIfThere } from "../shared/api.js";
 import { answered, button, field, form, h } from "../shared/dom.js";
 import { attempted } from "../shared/problem_view.js";
 import { batchOf, byOrder } from "./batch.js";
 import { IDENTIFIER, register } from "./registration.js";
+import { SUGGESTED } from "./run_file.js";
 import { registeredLike, similarRegistered } from "./similar_names.js";
 
 /** @import { Batch } from "./batch.js" */
@@ -78,7 +79,7 @@ function open(batch, page) {
     const ids = new Set(runs.flatMap(({ reading }) => reading?.clutch() ?? []));
     if (clutch.value !== "" || ids.size !== 1) return;
     [clutch.value] = ids;
-    hint.textContent = "suggested by the files’ names and title blocks";
+    hint.textContent = SUGGESTED;
     typedName();
   }
 
@@ -117,12 +118,7 @@ function open(batch, page) {
    * @type {(id: string) => Promise<string | null>}
    */
   async function registered(id) {
-    try {
-      await read(clutchPath(id));
-      return id;
-    } catch (problem) {
-      if (!(problem instanceof Problem && problem.status === 404)) throw problem;
-    }
+    if (await readIfThere(clutchPath(id))) return id;
     const lead = `No clutch is registered as “${id}”. Nothing has been sent yet.`;
     const chosen = await register(id, { lead, similar: await similarRegistered(id), record: batch.record });
     if (chosen !== null) clutch.value = chosen;
@@ -158,6 +154,6 @@ function notRuns(wrong) {
 function summary(stored, failed, held, id) {
   const text = failed > 0 ? `${stored} stored, ${failed} not stored: see each file.` : `All ${stored} stored.`;
   const doubted = held > 0 && ` ${held} of them ${held === 1 ? "is" : "are"} held, and must be confirmed or corrected.`;
-  const link = h("a", { href: `/clutches/${encodeURIComponent(id)}` }, `Open ${id}`);
+  const link = h("a", { href: pageOf(id) }, `Open ${id}`);
   return h("p", { class: `notice ${failed > 0 ? "bad" : "good"}` }, text, doubted, " ", stored > 0 && link);
 }

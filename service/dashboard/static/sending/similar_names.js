@@ -14,7 +14,6 @@ const MOST_DIFFERENT = 2;
  * @param {string} text
  */
 export async function registeredLike(text, limit = OFFERED) {
-  /** @type {{ body: ListPage<ClutchOut> }} */
   const { body } = await read(`/v1/clutches?sort=name&limit=${limit}&find=${encodeURIComponent(text)}`);
   return body.items.map((clutch) => clutch.clutch_id);
 }

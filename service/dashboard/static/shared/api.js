@@ -84,10 +84,10 @@ const MOST_KEPT = 64;
 const answers = new Map();
 
 /**
- * The answer's body, and whether it is another than last time.
- * @template Body
- * @param {string} path
- * @returns {Promise<{ body: Body, changed: boolean }>}
+ * The answer's body, of the type that the OpenAPI document gives it, and whether it is another than last time.
+ * @template {string} Path
+ * @param {Path} path
+ * @returns {Promise<{ body: AnswerTo<"GET", Path>, changed: boolean }>}
  */
 export async function read(path) {
   const before = answers.get(path);
@@ -105,22 +105,35 @@ export async function read(path) {
 }
 
 /**
+ * What `read` gives; null where there is nothing at that address.
+ * @template {string} Path
+ * @param {Path} path
+ */
+export async function readIfThere(path) {
+  try {
+    return await read(path);
+  } catch (problem) {
+    if (problem instanceof Problem && problem.status === 404) return null;
+    throw problem;
+  }
+}
+
+/**
  * All items of a list, page by page, or those of its first `pages`; `more`: whether there are others.
- * @template Item
- * @param {string} path
- * @returns {Promise<{ items: Item[], changed: boolean, more: boolean }>}
+ * @template {string} Path
+ * @param {Path} path
+ * @returns {Promise<{ items: Items<Path>, changed: boolean, more: boolean }>}
  */
 export async function readAll(path, pages = Infinity) {
-  /** @type {Item[]} */
-  const items = [];
+  const items = /** @type {Items<Path>} */ ([]);
   let changed = false;
   /** @type {string | null} */
   let cursor = null;
   do {
     pages -= 1;
+    /** @type {string} */
     const address =
       cursor === null ? path : `${path}${path.includes("?") ? "&" : "?"}cursor=${encodeURIComponent(cursor)}`;
-    /** @type {{ body: ListPage<Item>, changed: boolean }} */
     const page = await read(address);
     items.push(...page.body.items);
     changed ||= page.changed;
@@ -131,12 +144,13 @@ export async function readAll(path, pages = Infinity) {
 
 /**
  * Send something, a plain object as JSON; the answer's body and status.
- * @template Body
- * @param {string} method
- * @param {string} path
+ * @template {string} Method
+ * @template {string} Path
+ * @param {Method} method
+ * @param {Path} path
  * @param {BodyInit | object} body
  * @param {Record<string, string>} [headers]
- * @returns {Promise<{ status: number, location: string | null, body: Body }>}
+ * @returns {Promise<{ status: number, location: string | null, body: AnswerTo<Method, Path> }>}
  */
 export async function send(method, path, body, headers = {}) {
   const sent =
@@ -155,15 +169,15 @@ export const readText = async (path) => (await request(path)).text();
 /** @type {(path: string) => Promise<Blob>} a file that never changes under its address: the browser keeps it */
 export const readFile = async (path) => (await request(path, { cache: "default" })).blob();
 
-/** @param {string} id */
+/** @param {string} id a clutch's page */
+export const pageOf = (id) => `/clutches/${encodeURIComponent(id)}`;
+
+/** @type {(id: string) => ClutchPath} */
 export const clutchPath = (id) => `/v1/clutches/${encodeURIComponent(id)}`;
 
 /** Samples of a run that a drawing asks for: as many as it shows, whatever the length of the record. */
 const POINTS = 2000;
 
-/**
- * A run with its channels, thinned to what is drawn.
- * @type {(clutchId: string, runId: string) => Promise<{ body: RunOut, changed: boolean }>}
- */
+/** @type {(clutchId: string, runId: string) => Promise<{ body: RunOut }>} a run with its channels, thinned to what is drawn */
 export const readDrawn = (clutchId, runId) =>
   read(`${clutchPath(clutchId)}/runs/${encodeURIComponent(runId)}?points=${POINTS}`);

@@ -1,6 +1,5 @@
 // Questions in a dialog: each has a form that is sent, or is left.
 
-import { Problem } from "./api.js";
 import { answered, button, form, h } from "./dom.js";
 import { attempted } from "./problem_view.js";
 
@@ -33,34 +32,14 @@ export function asked({ title, lines = [], fields = [], action, leave = "Cancel"
   /** @type {Result | null} */
   let result = null;
   const work = async () => {
-    for (const old of dialog.querySelectorAll(".wrong")) old.remove();
-    try {
-      result = await send();
-      dialog.close();
-    } catch (problem) {
-      if (!(problem instanceof Problem) || !atFields(dialog, problem)) throw problem;
-    }
+    result = await send();
+    dialog.close();
   };
   const submit = () => attempted([go], answer, "Computing …", work, lead ?? "Nothing was changed. ");
   const cancel = leave !== null && button(leave, () => dialog.close());
   const buttons = h("div.row.buttons", cancel, go);
   dialog.append(h("h2", title), h("div", ...lines), form(submit, h("div.fields", fields), answer, buttons));
   return answered(dialog, () => result);
-}
-
-/** @type {(dialog: HTMLElement, problem: Problem) => boolean} say errors at the fields of their names; false where one has none */
-function atFields(dialog, { errors }) {
-  const places = errors.map(({ pointer, message }) => {
-    const input = dialog.querySelector(`[name="${CSS.escape(pointer.slice(1))}"]`);
-    return { input, text: h("p.wrong", { id: `wrong${pointer}`, role: "alert" }, message) };
-  });
-  if (places.length === 0 || places.some(({ input }) => input === null)) return false;
-  for (const { input, text } of places) {
-    input?.after(text);
-    input?.setAttribute("aria-describedby", text.id);
-  }
-  /** @type {HTMLElement} */ (places[0].input).focus();
-  return true;
 }
 
 /**

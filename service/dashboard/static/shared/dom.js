@@ -62,6 +62,10 @@ function filled(element, classes, [first, ...children]) {
   return element;
 }
 
+/** @type {(id: string, title: string, ...content: Content[]) => HTMLElement} a part of the page under its heading */
+export const section = (id, title, ...content) =>
+  h("section", { id, "aria-labelledby": `${id}-title` }, h("h2", { id: `${id}-title` }, title), ...content);
+
 /** @type {(id: string) => HTMLElement} an element that the page always has */
 export function byId(id) {
   const element = document.getElementById(id);
@@ -98,8 +102,23 @@ export function select(attributes, options, chosen) {
   return h("select", attributes, children);
 }
 
+/**
+ * What `select` offers: each value with its text.
+ * @template {string | number} Value
+ * @param {readonly Value[]} values
+ * @param {(value: Value) => string} text
+ */
+export const offered = (values, text) => values.map((value) => /** @type {[Value, string]} */ ([value, text(value)]));
+
 /** @type {(...content: Content[]) => HTMLElement} a paragraph beside the matter */
 export const quiet = (...content) => h("p.quiet", ...content);
+
+/** @type {(attributes: Attributes) => HTMLInputElement} a field for a number */
+export const numberInput = (attributes) =>
+  h("input", { type: "number", step: "any", inputmode: "decimal", ...attributes });
+
+/** Numbers the fields that have no name of their own. */
+let fields = 0;
 
 /**
  * A field below its label.
@@ -107,7 +126,10 @@ export const quiet = (...content) => h("p.quiet", ...content);
  * @param {Content} label
  * @param {Content} [more] what stands below it
  */
-export const field = (input, label, more = null) => h("div", h("label", { for: input.id }, label), input, more);
+export function field(input, label, more = null) {
+  input.id ||= `field-${(fields += 1)}`;
+  return h("div", h("label", { for: input.id }, label), input, more);
+}
 
 /** @type {(submit: () => unknown, ...content: Content[]) => HTMLFormElement} a form whose values the browser does not keep */
 export function form(submit, ...content) {
@@ -170,7 +192,7 @@ export function menu(label, entries) {
       onclick();
     };
     const pressed = checked === undefined ? null : String(checked);
-    return h("button", { type: "button", onclick: choose, "aria-pressed": pressed }, text);
+    return button(text, choose, { "aria-pressed": pressed });
   });
   details.append(h("div.entries", items));
   details.addEventListener("keydown", (event) => {
@@ -241,6 +263,5 @@ export function copyable(text) {
     }, 3000);
   };
   const label = `Copy: ${text.split("\n")[0].slice(0, 60)}`;
-  const button = h("button", { type: "button", onclick: copy, "aria-label": label }, "Copy");
-  return h("div.row.command", h("pre", { tabindex: "0" }, code), button, status);
+  return h("div.row.command", h("pre", { tabindex: "0" }, code), button("Copy", copy, { "aria-label": label }), status);
 }

@@ -82,7 +82,7 @@ function cell(value) {
 }
 
 /** @param {Cell[][]} rows */
-export function xlsxOf(rows) {
+function xlsxOf(rows) {
   const lines = rows.map((row) => `<row>${row.map(cell).join("")}</row>`).join("");
   const sheet = `<worksheet xmlns="${OFFICE}/spreadsheetml/2006/main"><sheetData>${lines}</sheetData></worksheet>`;
   return new Blob(zipped({ ...PARTS, "xl/sheet.xml": sheet }), { type: `${TYPE}.sheet` });

@@ -75,9 +75,8 @@ export function interval(quantiles) {
 
 /** @type {(quantiles: Quantiles) => string} what is likely of remaining cycles: the median and the 90 % interval */
 export function likely(quantiles) {
-  const { 0.05: low, 0.5: median, 0.95: high } = quantiles;
-  const about = median === null ? "over 1,000,000" : cycles(median, low, high);
-  return `50 % chance of ${about} or more; 90 % interval: ${interval(quantiles)}`;
+  const about = quantiles["0.5"] === null ? "over 1,000,000" : `${median(quantiles)} or more`;
+  return `50 % chance of ${about}; 90 % interval: ${interval(quantiles)}`;
 }
 
 /** Fewer cycles than this are not counted out. */
@@ -94,6 +93,12 @@ export function roundedDown(value) {
   const unit = 10 ** Math.max(0, Math.floor(Math.log10(Math.max(1, value))) - 1);
   return fixed(Math.floor(value / unit) * unit);
 }
+
+/** @type {(count: number, one: string, several?: string) => string} a number with what is counted: 1 run, 2 runs */
+export const counted = (count, one, several = `${one}s`) => `${fixed(count)} ${count === 1 ? one : several}`;
+
+/** @type {(quantiles: Quantiles) => string} the median, as far as the 90 % interval lets it be known */
+export const median = (quantiles) => cycles(quantiles["0.5"], quantiles["0.05"], quantiles["0.95"]);
 
 /** @type {(share: Maybe, decimals?: number) => string} a share of one as a percentage */
 export const percent = (share, decimals = 0) => (isNumber(share) ? `${fixed(100 * share, decimals)} %` : NONE);
@@ -124,10 +129,7 @@ export function age(moment, now = Date.now()) {
   let left = Math.max(0, (now - moment) / 1000);
   if (left < 5) return "just now";
   for (const [size, unit, units] of STEPS) {
-    if (left < size) {
-      const count = Math.floor(left);
-      return `${count} ${count === 1 ? unit : units} ago`;
-    }
+    if (left < size) return `${counted(Math.floor(left), unit, units)} ago`;
     left /= size;
   }
   return NONE;
@@ -146,13 +148,14 @@ export const clock = (when) => when.toLocaleTimeString("en-GB");
 const KINDS = {
   stationary_stribeck: "Stationary Stribeck test",
   dynamic_stribeck: "Dynamic Stribeck test",
-  duty_cycles: "Duty cycles",
   run_in: "Run-in",
-  maintenance: "Maintenance",
 };
 
 /** @type {(kind: string) => string} what kind of run it is, in words */
 export const kindName = (kind) => KINDS[kind] ?? words(kind);
+
+/** @type {(run: { kind: string, cycles?: number }) => string} what a run is called in a sentence */
+export const runName = ({ kind, cycles: at }) => `${kindName(kind)} at ${fixed(at)} cycles`;
 
 /** @type {(name: unknown) => string} snake_case as words */
 export function words(name) {

@@ -24,7 +24,7 @@ export function sparkline(values, threshold = null) {
   return svg(
     "svg.spark",
     { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, width: WIDTH, height: HEIGHT, "aria-hidden": "true" },
-    level === null ? null : svg("line.threshold", { x1: 0, x2: WIDTH, y1: level, y2: level }),
+    level !== null && svg("line.threshold", { x1: 0, x2: WIDTH, y1: level, y2: level }),
     svg("polyline", { points }),
     svg("circle", { cx: x(last), cy: y(numbers[last]), r: 2.6 }),
   );
@@ -46,16 +46,15 @@ export function intervalBar(quantiles, scale) {
     svg("rect", { ...size, x: from.toFixed(1), width: Math.max(1.5, to - from).toFixed(1), rx: 1.5 });
   const [median, high] = [quantiles["0.5"], quantiles["0.95"]];
   const beyond = high === null || high > scale;
+  const most = WIDTH - (beyond ? 9 : 2); // beside the arrow
   return svg(
     "svg.interval",
     { viewBox: `0 0 ${WIDTH} 14`, width: WIDTH, height: 14, "aria-hidden": "true" },
     svg("line.axis", { x1: 0, x2: WIDTH, y1: 7, y2: 7 }),
     bar(at("0.05"), at("0.95"), { class: "wide", y: 5, height: 4 }),
     bar(at("0.25"), at("0.75"), { class: "half", y: 3, height: 8 }),
-    median === null
-      ? null
-      : svg("rect.median", { x: Math.min(WIDTH - 2, at("0.5")).toFixed(1), width: 2, y: 1, height: 12 }),
-    beyond ? svg("path.beyond", { d: `M${WIDTH - 6} 3l5 4-5 4` }) : null,
+    median !== null && svg("rect.median", { x: Math.min(most, at("0.5")).toFixed(1), width: 2, y: 1, height: 12 }),
+    beyond && svg("path.beyond", { d: `M${WIDTH - 6} 3l5 4-5 4` }),
   );
 }
 

@@ -1,6 +1,7 @@
 // The state of a clutch, after NAMUR NE 107, as the service says it: one of five, each with its own word, shape and colour.
 
 import { svg } from "./dom.js";
+import { counted } from "./format.js";
 
 /** @typedef {ClutchState["name"]} StateName */
 
@@ -13,20 +14,11 @@ export const STATES = {
   normal: "Normal",
 };
 
-/** @type {Record<string, string>} */
-export const VERDICTS = {
-  model_adequate: "Model adequate",
-  cause_named: "Cause named",
-  cause_ambiguous: "Cause ambiguous",
-  unexplained_structure: "Unexplained structure",
-  insufficient_data: "Too little data",
-};
-
 /** @type {(name: StateName) => Record<string, string>} a state's colour, which the style sheet has under its name */
 export const colourOf = (name) => ({ color: `var(--${name})` });
 
 /** @type {(count: number) => string} how many runs of a clutch wait for someone to look at them */
-export const heldText = (count) => `${count} ${count === 1 ? "run" : "runs"} held`;
+export const heldText = (count) => `${counted(count, "run")} held`;
 
 const CIRCLE = "M10 1a9 9 0 1 1 0 18a9 9 0 1 1 0-18z";
 const SQUARE = "M4.5 1.5h11a3 3 0 0 1 3 3v11a3 3 0 0 1-3 3h-11a3 3 0 0 1-3-3v-11a3 3 0 0 1 3-3z";

@@ -4,24 +4,26 @@ import { kept } from "./api.js";
 import { menu } from "./dom.js";
 import { fixed } from "./format.js";
 
-/** @typedef {{ name: string, unit: string, decimals: number, of: (value: number, bar?: number, clutch?: Pick<ClutchOut, "geometry">) => number }} Unit */
+/** @typedef {{ name: string, unit: string, decimals: number, of: (value: number, bar?: number, clutch?: Shaped) => number }} Unit */
 
 const CHOICE = kept(() => localStorage, "clutchlife-units");
 const PSI_PER_BAR = 14.5038;
 const LBF_FT_PER_NM = 0.737562;
 
-/** @returns {{ system: "si" | "us", friction: "torque" | "cof" }} */
+/** @type {{ system: "si" | "us", friction: "torque" | "cof" }} */
+const USUAL = { system: "si", friction: "torque" };
+
 function chosen() {
   try {
-    return { system: "si", friction: "torque", ...JSON.parse(CHOICE.get() ?? "{}") };
+    return { ...USUAL, ...JSON.parse(CHOICE.get() ?? "{}") };
   } catch {
-    return { system: "si", friction: "torque" }; // not as this page wrote it
+    return USUAL; // not as this page wrote it
   }
 }
 
 /**
  * Torque over the torque at a coefficient of friction of 1: faces x pressure x lining area x mean radius.
- * @type {(nm: number, bar?: number, clutch?: Pick<ClutchOut, "geometry">) => number}
+ * @type {(nm: number, bar?: number, clutch?: Shaped) => number}
  */
 function cofOf(nm, bar, clutch) {
   if (bar === undefined || clutch === undefined) return NaN;
@@ -35,7 +37,7 @@ function cofOf(nm, bar, clutch) {
   return nm / (faces * 1e5 * bar * factor * area * meanRadius(clutch));
 }
 
-/** @type {(clutch: Pick<ClutchOut, "geometry">) => number} (d_i + d_o)/4, or the one in the clutch's record, m */
+/** @type {(clutch: Shaped) => number} (d_i + d_o)/4, or the one in the clutch's record, m */
 export function meanRadius({ geometry }) {
   const mm = geometry.mean_radius_mm ?? (geometry.inner_diameter_mm + geometry.outer_diameter_mm) / 4;
   return mm / 1000;
@@ -45,12 +47,15 @@ export function meanRadius({ geometry }) {
 export function units() {
   const { system, friction } = chosen();
   const us = system === "us";
-  /** @type {Unit} */
-  const plainTorque = us
-    ? { name: "friction torque", unit: "lbf·ft", decimals: 2, of: (nm) => LBF_FT_PER_NM * nm }
-    : { name: "friction torque", unit: "Nm", decimals: 2, of: (nm) => nm };
   return {
-    torque: friction === "cof" ? { name: "coefficient of friction µ", unit: "", decimals: 4, of: cofOf } : plainTorque,
+    torque:
+      friction === "cof"
+        ? { name: "coefficient of friction µ", unit: "", decimals: 4, of: cofOf }
+        : {
+            name: "friction torque",
+            decimals: 2,
+            ...(us ? { unit: "lbf·ft", of: (nm) => LBF_FT_PER_NM * nm } : { unit: "Nm", of: (nm) => nm }),
+          },
     pressure: us
       ? { name: "pressure", unit: "psi", decimals: 0, of: (bar) => PSI_PER_BAR * bar }
       : { name: "pressure", unit: "bar", decimals: 1, of: (bar) => bar },
@@ -66,8 +71,8 @@ export function pressureText(bar) {
   return `${fixed(bar === null || bar === undefined ? bar : of(bar), decimals)} ${unit}`;
 }
 
-/** @param {HTMLElement} place in the bar at the top */
-export function placeUnits(place) {
+/** @type {(place: HTMLElement, changed: () => unknown) => void} a choice in the bar at the top; `changed`: hears of another one */
+export function placeUnits(place, changed) {
   function draw() {
     const now = chosen();
     /** @type {(label: string, part: Partial<typeof now>) => { label: string, checked: boolean, onclick: () => void }} */
@@ -76,7 +81,8 @@ export function placeUnits(place) {
       checked: Object.entries(part).every(([name, value]) => now[/** @type {keyof typeof now} */ (name)] === value),
       onclick: () => {
         CHOICE.set(JSON.stringify({ ...now, ...part }));
-        document.dispatchEvent(new Event("unitschange"));
+        draw();
+        changed();
       },
     });
     const entries = [
@@ -87,6 +93,5 @@ export function placeUnits(place) {
     ];
     place.replaceChildren(menu("Units", entries));
   }
-  document.addEventListener("unitschange", draw);
   draw();
 }

@@ -5,9 +5,9 @@ const GERMAN = `
 Clutches = Kupplungen; All clutches = Alle Kupplungen; Clutch = Kupplung; Alarms = Alarme; Help = Hilfe; Send runs = Läufe senden;
 Register a clutch = Kupplung anmelden; Print report = Bericht drucken; Units = Einheiten; More = Mehr; Compare = Vergleichen;
 Overview = Übersicht; Diagnosis = Diagnose; Curves = Kurven; Loops = Schleifen; Engagements = Schaltungen; Runs = Läufe; History = Verlauf;
-State = Zustand; What to do = Was zu tun ist; Safe for, cycles = Sicher für, Schaltspiele; Health = Gesundheit; Trend = Trend; Last run = Letzter Lauf;
+State = Zustand; What to do = Was zu tun ist; Safe for, cycles = Sicher für, Schaltspiele; Health = Gesundheit; Last run = Letzter Lauf;
 Sort = Sortieren; what needs somebody = was jemanden braucht; name = Name; grouped by kind = nach Bauart; Archived = Archiviert; Find = Suchen;
-Failure = Ausfall; Maintenance required = Wartungsbedarf; Function check = Funktionskontrolle; Normal = Normal;
+Failure = Ausfall; Maintenance required = Wartungsbedarf; Function check = Funktionskontrolle;
 Out of specification = Außerhalb der Spezifikation; Table = Tabelle; Show all = Alles zeigen; Cancel = Abbrechen; Close = Schließen;
 Remaining cycles = Restliche Schaltspiele; Safe for, cycles (95 %) = Sicher für, Schaltspiele (95 %); Threshold = Schwelle;
 Mean COF = Mittlerer Reibwert; mean COF = mittlerer Reibwert; Mean COF, tracked = Mittlerer Reibwert, verfolgt;
