@@ -47,7 +47,7 @@ class Tests:
     level_sd: float
 
 
-def _own_clock(cycles: FloatArray, latest: float) -> FloatArray:
+def _course_clock(cycles: FloatArray, latest: float) -> FloatArray:
     """Clock u of the course at cycles [k] for every scale [scales, k]; where no test was made after the start, any
     further one is at u = 1.
 
@@ -75,7 +75,7 @@ class CourseFit:
     def _columns(self, cycles: FloatArray, epoch: FloatArray, stretches: int = PAST + FUTURE) -> FloatArray:
         """Design matrix A [g, k, p] at cycles [k] in epochs [k], with the columns of so many of δ's stretches last,
         stretches after T behind the others."""
-        u = _own_clock(cycles, self.latest)
+        u = _course_clock(cycles, self.latest)
         levels = [criteria.LEVEL_SD * (cycles >= at) for at in self.tests.levels]
         steps = [criteria.STEP_SD * (epoch > e) for e in np.unique(self.tests.epoch)]
         level = np.stack([np.full(cycles.shape, self.tests.level_sd), *levels, *steps], axis=1)

@@ -9,7 +9,7 @@ from models.diagnosis.campaign import Campaign
 from models.diagnosis.design.design import build_design
 from models.diagnosis.diagnose import diagnose
 from models.diagnosis.effects.catalogue import columns_at_rows, columns_of, effects_for
-from models.diagnosis.explanations.evidence import projections_beside
+from models.diagnosis.explanations.evidence import coarse_projections
 from models.diagnosis.explanations.verdict import Verdict
 from models.diagnosis.pooled_fit.baseline_fit import fit_baseline
 from models.diagnosis.pooled_fit.projection import gram_of
@@ -35,7 +35,7 @@ def planted(campaign: Campaign, loudness: float) -> dict[str, Campaign]:
     design = baseline.problem.design
     columns = columns_of(effects_for(design.facts), design.facts)
     changes = columns_at_rows(design, baseline.fit.prediction, columns)
-    projections = projections_beside(gram_of(baseline.problem, baseline.fit, changes), baseline.problem.noise)
+    projections = coarse_projections(gram_of(baseline.problem, baseline.fit, changes), baseline.problem.noise)
     info = np.diag(max(projections, key=lambda each: each.evidence).info)
     shown = {column.effect.slug: k for k, column in enumerate(columns) if changes[:, k].any()}
     return {

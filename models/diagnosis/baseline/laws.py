@@ -255,7 +255,7 @@ class Scene:
         powers[is_open] = (1.0 - self.points.engaged[is_open])[:, None] * relative[:, None] ** np.arange(1, POWERS + 1)
         return powers
 
-    def curve_at(
+    def curve_with(
         self,
         *,
         cycles: FloatArray | None = None,

@@ -13,22 +13,22 @@ from models.arrays import FloatArray
 from models.diagnosis.baseline.prediction import Prediction
 from models.diagnosis.design.design import Design
 from models.diagnosis.design.facts import Facts
-from models.diagnosis.effects.effect import Effect, Shape, begins
+from models.diagnosis.effects.effect import Effect, Shape, with_onset
 from models.diagnosis.effects.history import ACCELERATED_WEAR, LOAD_SEVERITY, OIL_CHANGE, REST_RECOVERY, RUNNING_IN
 from models.diagnosis.effects.moving import INERTIA_TORQUE, SHAFT_RIPPLE, SQUEEZE_FILM, STICK_SLIP
 from models.diagnosis.effects.readings import CHANNEL_DELAY, PRESSURE_OFFSET, TORQUE_ZERO_SHIFT, UNSETTLED_DWELL
 from models.diagnosis.effects.thermal import HYDRODYNAMIC_DRAG, INTERFACE_HEATING, OIL_TEMPERATURE, VISCOUS_EXPONENT
 
 CATALOGUE: tuple[Effect, ...] = (
-    begins(OIL_TEMPERATURE),
-    begins(INTERFACE_HEATING),
-    begins(HYDRODYNAMIC_DRAG),
+    with_onset(OIL_TEMPERATURE),
+    with_onset(INTERFACE_HEATING),
+    with_onset(HYDRODYNAMIC_DRAG),
     TORQUE_ZERO_SHIFT,
     PRESSURE_OFFSET,
-    begins(UNSETTLED_DWELL),
-    begins(CHANNEL_DELAY),
-    begins(INERTIA_TORQUE),
-    begins(SQUEEZE_FILM),
+    with_onset(UNSETTLED_DWELL),
+    with_onset(CHANNEL_DELAY),
+    with_onset(INERTIA_TORQUE),
+    with_onset(SQUEEZE_FILM),
     SHAFT_RIPPLE,
     STICK_SLIP,
     RUNNING_IN,
@@ -39,7 +39,7 @@ CATALOGUE: tuple[Effect, ...] = (
 )
 
 #: No causes any more, for nothing tells them from the form of the friction curve; reports that are stored name them.
-RETIRED: tuple[Effect, ...] = (begins(VISCOUS_EXPONENT),)
+RETIRED: tuple[Effect, ...] = (with_onset(VISCOUS_EXPONENT),)
 
 BY_SLUG = {effect.slug: effect for effect in (*CATALOGUE, *RETIRED)}
 

@@ -142,7 +142,7 @@ class Effect:
     courses: Callable[[Facts], tuple[Tried, ...]] | None = None
     # (scene, settings) -> [P, m] Nm, the change for many (amplitude, shape) at once, where that is cheaper
     several: Callable[[Scene, Sequence[tuple[float, Shape]]], FloatArray] | None = None
-    begins: bool = False  # whether its last shape is the cycle from which on it is at work (`begins` below)
+    has_onset: bool = False  # whether its last shape is the cycle from which on it is at work (`with_onset` below)
     grows_with: Measure | None = None
     counts_in_severity: bool = False  # its amplitude is the exponent by which ζ counts engagements, no torque
     named: bool = True  # whether it may be named as a cause; else what it explains is uncatalogued and lies on `axis`
@@ -170,11 +170,11 @@ class Effect:
 
     def onset(self, shape: Shape) -> float:
         """The cycle from which the effect is at work."""
-        return shape[-1] if self.begins else FROM_THE_START
+        return shape[-1] if self.has_onset else FROM_THE_START
 
     def from_the_start(self, shape: Shape) -> Shape:
         """The shape of an effect that is at work in every test."""
-        return (*shape[:-1], FROM_THE_START) if self.begins else shape
+        return (*shape[:-1], FROM_THE_START) if self.has_onset else shape
 
     def lags(self, shape: Shape) -> bool:
         """Whether the effect changes the stationary curve, so that friction in loops lags behind its change."""
@@ -230,7 +230,7 @@ class Effect:
         return peak + math.lgamma(half + 0.5) - math.lgamma(half) - 0.5 * math.log(half)
 
 
-def begins(effect: Effect) -> Effect:
+def with_onset(effect: Effect) -> Effect:
     """The effect with an onset cycle as its last shape: from the start or from a state on, the one as probable as the
     other, and each state as probable as the next. A fault need not have been there in the first test, and were a step
     in the template of one effect alone, any step would be taken for that effect. A step is tried with its likeliest
@@ -262,7 +262,7 @@ def begins(effect: Effect) -> Effect:
     return replace(
         effect,
         shapes=(*effect.shapes, ShapeParameter(name="onset ζ_k", unit="cycles")),
-        begins=True,
+        has_onset=True,
         grid=grid,
         change=lambda scene, amplitude, shape: several(scene, [(amplitude, shape)])[:, 0],
         several=None if effect.several is None else several,

@@ -15,7 +15,7 @@ from models.arrays import FloatArray
 from models.diagnosis.baseline.laws import Scene, curve
 from models.diagnosis.design.design import CLOCK, CYCLES, PRESSURE, SPEED, IntArray
 from models.diagnosis.design.facts import Facts
-from models.diagnosis.effects.effect import CREEPS, Effect, EffectKind, Shape, ShapeParameter, Tried, begins
+from models.diagnosis.effects.effect import CREEPS, Effect, EffectKind, Shape, ShapeParameter, Tried, with_onset
 from models.friction.stribeck import PARAMETER_NAMES
 
 #: The first shape of a gain over life says whether it steps (at the cycle that follows) or creeps (by the power).
@@ -40,7 +40,7 @@ def direction_if_both(scene: Scene, values: FloatArray) -> FloatArray:
     return direction if each_way >= max(least, 1.0) else np.zeros_like(direction)
 
 
-def _gains_with_life(facts: Facts) -> tuple[Tried, ...]:
+def _courses_over_life(facts: Facts) -> tuple[Tried, ...]:
     if facts.states.size < 3:
         return ()
     weight = -float(np.log(len(facts.onsets)))
@@ -56,7 +56,7 @@ def _gain_with_life(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
     return np.asarray(amplitude * share * scene.curve, dtype=np.float64)
 
 
-def _gains_with_clock(_: Facts) -> tuple[Tried, ...]:
+def _courses_over_test(_: Facts) -> tuple[Tried, ...]:
     return tuple(Tried(shape=(time, in_loops)) for time in (0.0, 60.0, 150.0, 400.0) for in_loops in (0.0, 1.0))
 
 
@@ -115,7 +115,7 @@ def _fault(
 
 def _step(slug: str, title: str, change: Callable[[Scene, float, Shape], FloatArray]) -> Effect:
     """A rig fault with an onset after the first state: the baseline absorbs a fault that is there from the start."""
-    fault = begins(_fault(slug, title, CYCLES, change, before_lag=True))
+    fault = with_onset(_fault(slug, title, CYCLES, change, before_lag=True))
 
     def grid(facts: Facts) -> tuple[Tried, ...]:
         return tuple(Tried(shape=(onset,)) for _, onset, _ in facts.onsets) if facts.states.size > 2 else ()
@@ -124,13 +124,13 @@ def _step(slug: str, title: str, change: Callable[[Scene, float, Shape], FloatAr
 
 
 FAULTS: tuple[Effect, ...] = (
-    begins(
+    with_onset(
         _fault(
             "gain_with_clock",
             "a gain of the torque that drifts while a test lasts, as a sensor's does that warms up",
             CLOCK,
             _gain_with_clock,
-            _gains_with_clock,
+            _courses_over_test,
             shapes=2,
         )
     ),
@@ -139,17 +139,17 @@ FAULTS: tuple[Effect, ...] = (
         "a gain of the torque that steps or creeps over the life, as after another calibration",
         CYCLES,
         _gain_with_life,
-        _gains_with_life,
+        _courses_over_life,
         shapes=2,
     ),
     _step(
         "speed_scale_step",
         "another scale of the speed, as of another encoder or belt",
-        lambda scene, a, _: scene.curve_at(velocity=scene.points.velocity * _factor(a)) - scene.curve_at(),
+        lambda scene, a, _: scene.curve_with(velocity=scene.points.velocity * _factor(a)) - scene.curve_with(),
     ),
     _step("static_torque_step", "a step of the static torque", _parameter_scaled("static_torque")),
     _step("stribeck_velocity_step", "a step of the Stribeck velocity", _parameter_scaled("stribeck_velocity")),
-    begins(
+    with_onset(
         _fault(
             "gauge_hysteresis",
             "a pressure that depends on whether it was last raised or lowered",
@@ -159,7 +159,7 @@ FAULTS: tuple[Effect, ...] = (
             ),
         )
     ),
-    begins(
+    with_onset(
         _fault(
             "speed_hysteresis",
             "a torque that depends on whether the speed was last raised or lowered",

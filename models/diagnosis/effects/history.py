@@ -139,7 +139,7 @@ def _faster(scene: Scene, lost: float, onset: float) -> FloatArray:
     reached = last + _PACES * (last - onset)
     static = scene.laws.parameters(np.full(reached.size, scene.facts.usual_pressure), reached)[:, 0]
     pace = float(np.interp(abs(lost), np.maximum.accumulate(1.0 - static / static[0]), _PACES))
-    changed = scene.curve_at(cycles=cycles + pace * np.maximum(cycles - onset, 0.0)) - scene.curve_at()
+    changed = scene.curve_with(cycles=cycles + pace * np.maximum(cycles - onset, 0.0)) - scene.curve_with()
     return changed if lost >= 0.0 else -changed
 
 
@@ -225,7 +225,7 @@ LOAD_SEVERITY = Effect(
     lowest=0.0,
     grid=_load_severity_grid,
     change=lambda scene, amplitude, _: (
-        scene.curve_at(cycles=effective_cycles(scene.points.cycles, scene.facts, amplitude)) - scene.curve_at()
+        scene.curve_with(cycles=effective_cycles(scene.points.cycles, scene.facts, amplitude)) - scene.curve_with()
     ),
     before_lag=True,
     discrepancies=(Discrepancy.LIFE,),

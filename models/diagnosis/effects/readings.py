@@ -162,12 +162,12 @@ def _offsets(facts: Facts, growing: Sequence[Shape]) -> tuple[Tried, ...]:
 
 
 def _pressure_offset_changes(scene: Scene, settings: Sequence[tuple[float, Shape]]) -> FloatArray:
-    as_read = scene.curve_at(pressure=scene.points.pressure)  # by the same law below the lowest level
+    as_read = scene.curve_with(pressure=scene.points.pressure)  # by the same law below the lowest level
     changes = np.empty((as_read.size, len(settings)))
     for place, (amplitude, shape) in enumerate(settings):
         offset = amplitude * _pressure_offset_share(scene, shape)
         pressed = np.maximum(scene.points.pressure + offset, 0.0)  # nothing pulls the plates apart
-        changes[:, place] = scene.curve_at(pressure=pressed) - as_read
+        changes[:, place] = scene.curve_with(pressure=pressed) - as_read
     return changes
 
 
@@ -237,7 +237,7 @@ def _unsettled_dwell_change(scene: Scene, amplitude: float, shape: Shape) -> Flo
         difference = np.clip(difference, -limit, limit)
     else:
         keep = np.where(follows, float(np.clip(amplitude * carried, 0.0, 0.95)), 0.0)
-        settled = scene.curve_at()
+        settled = scene.curve_with()
         difference = recursion(keep, (1.0 - keep) * settled)[before] - settled  # what each plateau ends with
     return np.asarray(amplitude * np.where(follows, difference, 0.0), dtype=np.float64)
 
@@ -277,7 +277,7 @@ def _channel_delay_change(scene: Scene, amplitude: float, _shape: Shape) -> Floa
     looping = np.flatnonzero(points.loop >= 0)
     if looping.size:
         velocity, frequency = by_loop(points, looping)
-        curves, phases = scene.curve_at()[looping].reshape(velocity.shape), velocity.shape[1]
+        curves, phases = scene.curve_with()[looping].reshape(velocity.shape), velocity.shape[1]
         step = amplitude * frequency * phases / (2 * np.pi)
         out[looping] = (_shifted(curves, np.clip(step, -phases, phases)) - curves).ravel()
     return out

@@ -19,12 +19,12 @@ from scipy.special import erfcx
 from models.arrays import FloatArray
 from models.diagnosis import criteria
 from models.diagnosis.baseline.law_form import LawSizes
-from models.diagnosis.design.design import Design
+from models.diagnosis.design.design import Design, IntArray
 from models.diagnosis.effects.fitted_effect import discrepancy_factors, ranges_of, small_factors_at
 from models.diagnosis.explanations.contrasts import contrasts_of
 from models.diagnosis.pooled_fit.gauss_newton import PooledFit
 from models.diagnosis.pooled_fit.problem import FitProblem
-from models.diagnosis.pooled_fit.projection import Gram, Projected, gram_of, isolability, projections_beside
+from models.diagnosis.pooled_fit.projection import Gram, Projected, coarse_projections, gram_of, isolability
 from models.gaussian_evidence import independent, log_gain, log_gain_alone, log_mean, log_sum
 
 
@@ -44,48 +44,43 @@ class Evidence:
 def evidence_of(
     problem: FitProblem, fitted: PooledFit, beside: FloatArray | None = None, *, smooth: bool = True
 ) -> Evidence:
-    """The evidence about a fit, with smooth structure unless `smooth` is false; changes [N, m] Nm `beside` it are
-    projected for the screen of one further effect."""
+    """Log marginal likelihood about a fit [nats], by the formula above, with smooth structure unless `smooth` is false.
+
+    Changes [N, m] Nm `beside` the fit are projected for the screen of one further effect."""
     design = problem.design
-    nothing = np.zeros((design.torque.size, 0))
-    contrasts, lies = visible_contrasts(problem, fitted) if smooth else (nothing, [])
-    factors, uncertain = template_errors(design, fitted)
-    changes = (contrasts, off_by(design, fitted, factors))
-    gram = gram_of(problem, fitted, np.concatenate(changes, axis=1), screened=beside)
-    gram, outward = _held_at_bounds(gram, int(problem.priors.free.sum()), fitted)
-    ends = np.cumsum([outward.size, *(change.shape[1] for change in changes)])
-    at_bounds, contrasted, wrong = (slice(a, b) for a, b in zip([0, *ends[:-1]], ends, strict=True))
-    axes = np.array(lies)
-    places = {axis: contrasted.start + np.flatnonzero(axes == axis) for axis in dict.fromkeys(lies)}
+    contrasts, axes = visible_contrasts(problem, fitted) if smooth else (np.zeros((design.torque.size, 0)), [])
+    factors, uncertain = template_error_factors(design, fitted)
+    changes = np.concatenate([contrasts, template_error_columns(design, fitted, factors)], axis=1)
+    gram = gram_of(problem, fitted, changes, screened=beside)
+    gram, outward = _bounds_as_changes(gram, int(problem.priors.free.sum()), fitted)
+    at_bounds, templates = slice(0, outward.size), slice(outward.size + len(axes), None)
+    places = {axis: outward.size + np.flatnonzero(np.array(axes) == axis) for axis in dict.fromkeys(axes)}
     prior = _log_prior(fitted)
-    wholes, screened = [], []
-    structures: dict[str, list[float]] = {axis: [] for axis in places}
-    projections = projections_beside(gram, problem.noise)
-    for projected in projections:
-        base = projected.evidence + _beside_bounds(projected, at_bounds, outward) + prior
-        wholes.append(base + _averaged(projected, wrong, uncertain, criteria.TEMPLATE_ERRORS))
-        for axis, columns_of_axis in places.items():
-            structures[axis].append(
-                base
-                + structure_gain(
-                    projected.info[np.ix_(columns_of_axis, columns_of_axis)], projected.score[columns_of_axis]
-                )
-            )
-        none = np.zeros(0)
-        screened.append(replace(projected, info=np.zeros((0, 0)), score=none, whole=none, evidence=base))
-    total = log_sum(wholes)
-    likely = projections[int(np.argmax(wholes))]
+    projections = coarse_projections(gram, problem.noise)
+    exact = [one.evidence + _log_integral_at_bounds(one, at_bounds, outward) + prior for one in projections]
+    whole = [log + _template_error_gain(one, templates, uncertain) for log, one in zip(exact, projections, strict=True)]
+    total = log_sum(whole)
+    structure, patterns = {}, {}
+    for axis, columns in places.items():
+        logs = [
+            log + structure_gain(one.info[np.ix_(columns, columns)], one.score[columns])
+            for log, one in zip(exact, projections, strict=True)
+        ]
+        structure[axis] = log_sum(logs) - total
+        likeliest = projections[int(np.argmax(logs))]
+        patterns[axis] = contrasts[:, columns - outward.size] @ _likeliest_coefficients(likeliest, columns)
     return Evidence(
         whole=total,
-        isolability=_isolability(problem, fitted, likely),
-        structure={axis: log_sum(logs) - total for axis, logs in structures.items()},
-        patterns={
-            axis: contrasts[:, axes == axis]
-            @ _likeliest(projections[int(np.argmax(structures[axis]))], columns_of_axis)
-            for axis, columns_of_axis in places.items()
-        },
-        screened=tuple(screened),
+        isolability=_isolability(problem, fitted, projections[int(np.argmax(whole))]),
+        structure=structure,
+        patterns=patterns,
+        screened=tuple(_screen_alone(one, log) for one, log in zip(projections, exact, strict=True)),
     )
+
+
+def _screen_alone(projected: Projected, log_evidence: float) -> Projected:
+    """The projection with its screened columns, without the changes, and with the log evidence [nats] of the fit."""
+    return replace(projected, info=np.zeros((0, 0)), score=np.zeros(0), whole=np.zeros(0), evidence=log_evidence)
 
 
 def _isolability(problem: FitProblem, fitted: PooledFit, likely: Projected) -> tuple[float, ...]:
@@ -109,7 +104,7 @@ def visible_contrasts(problem: FitProblem, fitted: PooledFit) -> tuple[FloatArra
     return contrasts[:, shown], list(compress(axes, shown))
 
 
-def template_errors(design: Design, fitted: PooledFit) -> tuple[list[FloatArray], FloatArray]:
+def template_error_factors(design: Design, fitted: PooledFit) -> tuple[list[FloatArray], FloatArray]:
     """Factors φ [N, m] of each effect's template error at the rows, and over all effects [Σ m] a 1 for each factor of
     the effect's own discrepancy, a 0 for the small ones that every template has."""
     small = small_factors_at(design.rows, ranges_of(design.rows))
@@ -120,21 +115,21 @@ def template_errors(design: Design, fitted: PooledFit) -> tuple[list[FloatArray]
     )
 
 
-def off_by(design: Design, fitted: PooledFit, factors: Sequence[FloatArray]) -> FloatArray:
-    """Changes of torque [N, Σ m] Nm by the effects' template errors: each effect's change times each of its factors
+def template_error_columns(design: Design, fitted: PooledFit, factors: Sequence[FloatArray]) -> FloatArray:
+    """Changes of torque [N, Σ m] Nm by a unit of each template error: each effect's change times each of its factors
     [N, m]."""
     rows = [effect.rows(design, fitted.prediction) for effect in fitted.effects]
     changes = [change[:, None] * effect_factors for change, effect_factors in zip(rows, factors, strict=True)]
     return np.concatenate([np.zeros((design.torque.size, 0)), *changes], axis=1)
 
 
-def _averaged(projected: Projected, wrong: slice, own: FloatArray, sizes: Sequence[tuple[float, float]]) -> float:
-    """Log Bayes factor [nats] of the templates' errors, averaged over pairs of prior deviations (of an effect's own
-    discrepancy, of the small errors of every template)."""
-    if not own.size:
+def _template_error_gain(projected: Projected, templates: slice, uncertain: FloatArray) -> float:
+    """Log Bayes factor [nats] of templates with errors over exact ones, averaged over TEMPLATE_ERRORS: pairs of prior
+    deviations, of an effect's own discrepancy (where `uncertain` [m] is 1) and of the small errors of every template."""
+    if not uncertain.size:
         return 0.0
-    info, score = projected.info[wrong, wrong], projected.score[wrong]
-    return log_mean([log_gain(info, score, np.where(own > 0, *size)) for size in sizes])
+    info, score = projected.info[templates, templates], projected.score[templates]
+    return log_mean([log_gain(info, score, np.where(uncertain > 0, *size)) for size in criteria.TEMPLATE_ERRORS])
 
 
 def structure_gain(info: FloatArray, score: FloatArray) -> float:
@@ -147,33 +142,38 @@ def structure_gain(info: FloatArray, score: FloatArray) -> float:
     return log_mean([*together.tolist(), *alone])
 
 
-def _likeliest(projected: Projected, mine: FloatArray) -> FloatArray:
-    """Posterior mean coefficients [k] of smooth structure, at the size of highest evidence."""
-    values, vectors = independent(projected.info[np.ix_(mine, mine)])
-    score = vectors.T @ projected.score[mine]
+def _likeliest_coefficients(projected: Projected, columns: IntArray) -> FloatArray:
+    """Posterior mean coefficients [k] of the smooth structure in these columns [k], at the size of highest evidence."""
+    values, vectors = independent(projected.info[np.ix_(columns, columns)])
+    score = vectors.T @ projected.score[columns]
     size = max(criteria.CONTRAST_SIZES, key=lambda size: float(log_gain_alone(values, score, size).sum()))
     return np.asarray(vectors @ (score / (values + size**-2.0)))
 
 
 def _log_prior(fitted: PooledFit) -> float:
     """Log normalisation of the priors of the effects' amplitudes and smooth shapes [nats]. An amplitude of one sign has
-    all of its prior there; one at its bound has one side of it, which `_beside_bounds` counts twice."""
+    all of its prior there; one at its bound has one side of it, which `_log_integral_at_bounds` counts twice."""
     logs = [e.effect.log_amplitude_peak + 0.5 * float(np.log(e.precisions[1:]).sum()) for e in fitted.effects]
     halves = sum(int(e.effect.positive) - int(not e.free[0]) for e in fitted.effects)
     return sum(logs) + float(np.log(2.0)) * halves
 
 
-def _held_at_bounds(gram: Gram, first: int, fitted: PooledFit) -> tuple[Gram, FloatArray]:
-    """The Gram matrix with the columns of the parameters [h] that are at a bound moved from the baseline to the head of
-    the changes, and the outward direction ±1 at each bound [h]. The effects' columns begin at `first`."""
-    ways: list[float] = []  # 0 for what is free
+def _outward_directions(fitted: PooledFit) -> FloatArray:
+    """Direction ±1 out of its range at each parameter of the effects [h] that is at a bound; 0 for each that is free."""
+    directions: list[float] = []
     for effect in fitted.effects:
         smooth = effect.effect.smooth(effect.shape)
         amplitude_out = 1.0 if effect.amplitude >= effect.effect.highest else -1.0
         out = np.array([amplitude_out, *(1.0 if 2 * x > shape.lowest + shape.highest else -1.0 for x, shape in smooth)])
-        ways += np.where(effect.free, 0.0, out).tolist()
-    outward = np.array(ways)
-    at_bound = gram.laws + first + np.flatnonzero(outward)
+        directions += np.where(effect.free, 0.0, out).tolist()
+    return np.array(directions)
+
+
+def _bounds_as_changes(gram: Gram, first: int, fitted: PooledFit) -> tuple[Gram, FloatArray]:
+    """The Gram matrix with the columns of parameters at a bound moved from the baseline to the head of the changes, and
+    the outward direction ±1 at each bound. The effects' columns begin at `first` behind the law's."""
+    directions = _outward_directions(fitted)
+    at_bound = gram.laws + first + np.flatnonzero(directions)
     order = np.concatenate(
         [np.setdiff1d(np.arange(gram.base), at_bound), at_bound, np.arange(gram.base, gram.matrix.shape[0])]
     )
@@ -181,10 +181,10 @@ def _held_at_bounds(gram: Gram, first: int, fitted: PooledFit) -> tuple[Gram, Fl
     if screened is not None:
         screened = replace(screened, cross=screened.cross[order])
     held = replace(gram, matrix=matrix, along=along, base=gram.base - at_bound.size, screened=screened)
-    return held, outward[outward != 0]
+    return held, directions[directions != 0]
 
 
-def _beside_bounds(projected: Projected, held: slice, outward: FloatArray) -> float:
+def _log_integral_at_bounds(projected: Projected, held: slice, outward: FloatArray) -> float:
     """Log integral [nats] over the parameters at a bound, ∫ e^{-gt - ht²/2} dt for each over its inner side, scaled to
     that of a normal: all of the prior lies on one side, and where the data ask for values beyond the bound, the
     posterior falls off from there."""

@@ -39,7 +39,7 @@ from models.diagnosis.design.design import Design
 from models.diagnosis.noise.covariance import Noise, whitened
 from models.diagnosis.pooled_fit.gauss_newton import PooledFit, fit, refit_beside
 from models.diagnosis.pooled_fit.problem import FitProblem
-from models.diagnosis.pooled_fit.projection import gram_of, left_over, projections_beside, projections_of
+from models.diagnosis.pooled_fit.projection import coarse_projections, gram_of, left_over, projections_of
 from models.gaussian_evidence import log_gain, log_mean, log_sum
 
 #: Steps of half a cycle a test: the first (two and a half cycles), slower ones that it must exceed, and the size of a
@@ -164,7 +164,7 @@ def outlier_evidence(problem: FitProblem, fitted: PooledFit) -> float:
     if refitted is None:
         return -np.inf
     gram = gram_of(problem, refitted, columns)
-    projections = projections_beside(gram, problem.noise)
+    projections = coarse_projections(gram, problem.noise)
     logs = [p.evidence + log_mean([log_gain(p.info, p.score, size) for size in _SIZES]) for p in projections]
     return log_sum(logs) - float(np.log(len(design.runs)))
 

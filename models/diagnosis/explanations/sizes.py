@@ -21,11 +21,11 @@ from models.diagnosis import criteria
 from models.diagnosis.effects.effect import Tried
 from models.diagnosis.effects.fitted_effect import Draw, FittedEffect
 from models.diagnosis.explanations.amplitude_posterior import Proportional
-from models.diagnosis.explanations.evidence import evidence_of, off_by, template_errors
+from models.diagnosis.explanations.evidence import evidence_of, template_error_columns, template_error_factors
 from models.diagnosis.explanations.verdict import Judgement
 from models.diagnosis.pooled_fit.gauss_newton import PooledFit, fit
 from models.diagnosis.pooled_fit.problem import FitProblem
-from models.diagnosis.pooled_fit.projection import Gram, Projected, Reduced, gram_of, projections_beside
+from models.diagnosis.pooled_fit.projection import Gram, Projected, Reduced, coarse_projections, gram_of
 from models.gaussian_evidence import log_sum
 
 #: Values of an amplitude that stand for its density.
@@ -228,7 +228,7 @@ def _most_alike(fitted: PooledFit, effect: FittedEffect, kind: Sequence[Tried]) 
 def _that_count(whole: Gram, gram: Gram, problem: FitProblem) -> Iterator[Projected]:
     """Projections of a fit's effects at each scatter of the gains and size of the law with at least NEGLIGIBLE of the
     posterior about the fit."""
-    about = projections_beside(whole, problem.noise)
+    about = coarse_projections(whole, problem.noise)
     total = log_sum([projected.evidence for projected in about])
     reduced: dict[tuple[float, float], Reduced] = {}
     for projected in about:
@@ -245,8 +245,8 @@ def _components_of(
     """Mixture components of a refit, one for each non-negligible combination of scatter of the gains, size of the law
     and size of the templates' errors."""
     design, free = problem.design, int(problem.priors.free.sum())
-    factors, uncertain = template_errors(design, fitted)
-    errors = off_by(design, fitted, factors)
+    factors, uncertain = template_error_factors(design, fitted)
+    errors = template_error_columns(design, fitted, factors)
     whole_gram = gram_of(problem, fitted, errors)
     gram = replace(whole_gram, base=whole_gram.laws + free)
     effects, places = fitted.effects, np.arange(len(fitted.effects))

@@ -272,7 +272,7 @@ class Reduced:
         return root @ (root.T @ self.matrix[:laws, -1]), root
 
 
-def likely_sizes(reduced: Reduced) -> dict[LawSizes, float]:
+def likely_law_sizes(reduced: Reduced) -> dict[LawSizes, float]:
     """The sizes of the law's discrepancy of non-negligible posterior at a scatter of the gains, with their log priors,
     likeliest first. These have more than NEGLIGIBLE_SIZES of the posterior; the best of each single value is kept too,
     because another may be likelier beside a change."""
@@ -303,7 +303,7 @@ def projections_of(gram: Gram, noise: Noise, gains: FloatArray | None = None) ->
     return _projections(gram, noise, curves, GAINS if gains is None else gains)
 
 
-def projections_beside(gram: Gram, noise: Noise) -> list[Projected]:
+def coarse_projections(gram: Gram, noise: Noise) -> list[Projected]:
     """Projections at every second scatter of the runs' gains, with the curves' scatter as estimated without an effect
     and with none, at the law's likely sizes. None, because an effect may be the reason for the curves' estimated
     scatter."""
@@ -313,7 +313,7 @@ def projections_beside(gram: Gram, noise: Noise) -> list[Projected]:
 def _projections(gram: Gram, noise: Noise, curves: Sequence[float], gains: FloatArray) -> list[Projected]:
     reduced = [gram.reduced(gain, curve) for curve in curves for gain in gains.tolist()]
     best = max(reduced, key=lambda one: one.beside_law(noise.law).evidence)
-    sizes = likely_sizes(best)
+    sizes = likely_law_sizes(best)
     return [one.beside_law(size, log_weight) for size, log_weight in sizes.items() for one in reduced]
 
 

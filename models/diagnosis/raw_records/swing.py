@@ -123,7 +123,7 @@ def best_order(records: Sequence[WhitenedRecord], line: Line | None = None) -> L
     for order, probability in ORDERS.items():
         logs = np.zeros((len(_LAWS), len(_COHERENT)))
         for (i, law), (j, coherent_time) in itertools.product(enumerate(_LAWS), enumerate(_COHERENT)):
-            found = _order_evidence(demodulated, order, sizes[law], groups[coherent_time])
+            found = _line_at_order(demodulated, order, sizes[law], groups[coherent_time])
             logs[i, j] = found.evidence
             if found.evidence + np.log(probability) > highest and found.peak > 0:
                 highest, best = found.evidence + float(np.log(probability)), found
@@ -213,7 +213,7 @@ def _powers(order: Demodulated, size: FloatArray, firsts: IntArray) -> tuple[Flo
     return np.abs(total[visible]) ** 2 / weight[visible], weight[visible]
 
 
-def _order_evidence(demodulated: dict[float, Demodulated], order: float, size: FloatArray, firsts: IntArray) -> Line:
+def _line_at_order(demodulated: dict[float, Demodulated], order: float, size: FloatArray, firsts: IntArray) -> Line:
     """The line at an order, with its evidence, for a relative amplitude `size` [b] and a phase kept within the
     groups."""
     power, weight = _powers(demodulated[order], size, firsts)
@@ -283,7 +283,7 @@ def windows_of(
     sums, weight = np.zeros((len(places), count), dtype=np.complex128), np.zeros((len(places), count))
     lowest_line = _VISIBLE_ABOVE * np.array([[record.lowest] for record, _, _ in places])
     for row, place in enumerate(places):
-        bins, matched, power = _spectrum_of(*place, frequency)
+        bins, matched, power = _matched_spectrum(*place, frequency)
         sums[row, bins], weight[row, bins] = matched, power
     speeds = [np.abs(record.speed[first:stop]) for record, first, stop in places]
     return Windows(
@@ -298,7 +298,7 @@ def windows_of(
     )
 
 
-def _spectrum_of(
+def _matched_spectrum(
     record: WhitenedRecord, first: int, stop: int, frequency: FloatArray
 ) -> tuple[IntArray, ComplexArray, FloatArray]:
     """Indices of the frequencies [f] Hz that the record shows in the window of samples [first, stop), and D and N

@@ -18,7 +18,7 @@ from models.diagnosis import criteria
 from models.diagnosis.baseline.law_form import EXACT, LearnedLaw
 from models.diagnosis.pooled_fit.gauss_newton import PooledFit, fit, sensitivities
 from models.diagnosis.pooled_fit.problem import FitProblem
-from models.diagnosis.pooled_fit.projection import Gram, Projected, gram_of, law_torque, learned_law, projections_beside
+from models.diagnosis.pooled_fit.projection import Gram, Projected, coarse_projections, gram_of, law_torque, learned_law
 from models.diagnosis.validation.held_out import FittedModel, Gain, measure_gain
 
 #: Draws of the posterior; bands of ln v.
@@ -84,7 +84,7 @@ def friction_law_of(problem: FitProblem, fitted: PooledFit, rng: np.random.Gener
     if problem.law is None or rows.size == 0:
         return None
     gram = gram_of(problem, fitted)
-    projections = projections_beside(gram, problem.noise)
+    projections = coarse_projections(gram, problem.noise)
     likely = max(projections, key=lambda projected: projected.evidence)
     columns, problem = problem.law.columns, problem.with_noise(likely.noise(problem.noise))
     exactly = problem.exact

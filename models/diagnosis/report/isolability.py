@@ -50,7 +50,7 @@ def visible_of(posterior: Posterior) -> tuple[Visible, ...]:
     Infinite where a shape would be absorbed at any amplitude; effects that are absorbed in every shape are left out."""
     sizes: dict[str, list[float]] = {}
     effects = {column.effect.slug: column.effect for column in posterior.columns}
-    for column, amplitude in zip(posterior.columns, amplitudes_of(posterior).tolist(), strict=True):
+    for column, amplitude in zip(posterior.columns, detectable_amplitudes(posterior).tolist(), strict=True):
         if column.effect.named:
             sizes.setdefault(column.effect.slug, []).append(amplitude * column.effect.scale)
     return tuple(
@@ -76,7 +76,7 @@ def unseen_of(posterior: Posterior, visible: Sequence[Visible], raw: Sequence[Ra
     return tuple(effect.slug for effect in CATALOGUE if effect.slug not in shown)
 
 
-def amplitudes_of(posterior: Posterior) -> FloatArray:
+def detectable_amplitudes(posterior: Posterior) -> FloatArray:
     """Detectable amplitude [m] of each column by the formula above, in SI units; infinite where it would be
     absorbed."""
     columns, projections = posterior.columns, posterior.null.evidence.screened
@@ -107,7 +107,8 @@ def isolability_of(campaign: Campaign, posterior: Posterior) -> Isolability:
     grouped = {
         slug: [(column, float(size)) for column, size in places]
         for slug, places in groupby(
-            zip(posterior.columns, amplitudes_of(posterior), strict=True), key=lambda place: place[0].effect.slug
+            zip(posterior.columns, detectable_amplitudes(posterior), strict=True),
+            key=lambda place: place[0].effect.slug,
         )
         if slug in slugs
     }

@@ -223,7 +223,7 @@ class Study:
 def of_size(slug: str, amplitude: float, shape: Shape) -> FittedEffect:
     """An effect as large and formed so, at work from the start where the shape does not say from when on."""
     effect = BY_SLUG[slug]
-    missing = effect.begins and len(shape) < len(effect.shapes)
+    missing = effect.has_onset and len(shape) < len(effect.shapes)
     return FittedEffect(effect=effect, amplitude=amplitude, shape=(*shape, FROM_THE_START) if missing else shape)
 
 

@@ -23,7 +23,7 @@ from models.diagnosis.pooled_fit.projection import (
     isolability,
     law_torque,
     learned_law,
-    likely_sizes,
+    likely_law_sizes,
     log_gain_prior,
     projections_of,
 )
@@ -230,12 +230,12 @@ def test_the_learned_law_is_the_dense_posterior_mean(problem: FitProblem, fitted
 def test_the_sizes_of_a_law_are_found_again(problem: FitProblem, fitted: PooledFit) -> None:
     """Residuals of a form off by 1 % ask for a form that is off, residuals of noise alone for the exact law."""
     reduced = gram_of(problem, fitted).reduced(problem.noise.run_gain, problem.noise.curve_gain)
-    kept = likely_sizes(reduced)
+    kept = likely_law_sizes(reduced)
     assert 0.006 <= next(iter(kept)).form <= 0.02
     noise = replace(
         fitted, residual=problem.noise.deviation * np.random.default_rng(6).standard_normal(fitted.torque.size)
     )
-    quiet = likely_sizes(gram_of(problem, noise).reduced(problem.noise.run_gain, problem.noise.curve_gain))
+    quiet = likely_law_sizes(gram_of(problem, noise).reduced(problem.noise.run_gain, problem.noise.curve_gain))
     assert next(iter(quiet)).form <= 0.002
     # of each size every value is kept once at least: beside a change another may be likelier
     for axis, values in enumerate((criteria.FORM_SIZES, criteria.PRESSURE_SIZES, criteria.LIFE_SIZES)):

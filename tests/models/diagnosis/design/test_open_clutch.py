@@ -101,7 +101,7 @@ def test_there_is_no_friction_with_the_clutch_open(given: Study) -> None:
     scene, opened = prediction.scene, prediction.scene.points.engaged == 0
     for values in (
         scene.curve, scene.gradient, scene.by_velocity, scene.by_pressure, scene.viscous,
-        scene.curve_at(cycles=scene.points.cycles + 100.0), scene.curve_at(pressure=scene.points.pressure * 1.1),
+        scene.curve_with(cycles=scene.points.cycles + 100.0), scene.curve_with(pressure=scene.points.pressure * 1.1),
     ):  # fmt: skip
         assert np.abs(values[opened]).max() == 0.0
         assert np.abs(values[~opened]).max() > 0.0

@@ -107,7 +107,7 @@ def test_units_of_a_few(scene: Scene) -> None:
     drag = BY_SLUG["hydrodynamic_drag"].change(scene, 1.0, (1.0, 0.0, 0.0, 0.0))
     assert np.ptp(drag[steady] / scene.points.velocity[steady]) < 1e-12  # pressure is not in it
     offset = BY_SLUG["pressure_offset"].change(scene, 1000.0, (0.0, 0.0, 0.0))
-    higher = scene.curve_at(pressure=scene.points.pressure + 1000.0) - scene.curve
+    higher = scene.curve_with(pressure=scene.points.pressure + 1000.0) - scene.curve
     np.testing.assert_allclose(offset, higher, rtol=0.02, atol=1e-4)
     zero = BY_SLUG["torque_zero_shift"].change(scene, 0.5, (0.0, 2000.0, *STRAIGHT))
     assert set(np.unique(zero)) == {0.0, 0.5}
@@ -135,7 +135,7 @@ def test_friction_that_hangs_on_speed_times_viscosity_is_within_reach(scene: Sce
     points = scene.points
     steady = points.steady
     thinner = np.exp(log_viscosity_ratio(points.temperature, scene.facts.reference_temperature, scene.facts.oil))
-    expected = scene.curve_at(velocity=points.velocity * thinner) - scene.curve
+    expected = scene.curve_with(velocity=points.velocity * thinner) - scene.curve
     change = BY_SLUG["oil_temperature"].change(scene, GAMMA, (HERSEY, -40.0))  # a film that has the oil's temperature
     assert np.abs(expected[steady]).max() > 0.01
     np.testing.assert_allclose(change[steady], expected[steady], atol=1e-9)
@@ -175,7 +175,7 @@ def test_wear_at_a_pace_is_the_clutch_of_later(scene: Scene) -> None:
     static = scene.laws.parameters(np.full(2, facts.usual_pressure), ends)[:, 0]
     lost = 1.0 - float(static[1] / static[0])
     change = BY_SLUG["accelerated_wear"].change(scene, lost, (onset, 1.0, PACE))
-    np.testing.assert_allclose(change, scene.curve_at(cycles=counted) - scene.curve, atol=2e-3 * np.abs(change).max())
+    np.testing.assert_allclose(change, scene.curve_with(cycles=counted) - scene.curve, atol=2e-3 * np.abs(change).max())
     assert lost > 0.01
 
 
