@@ -48,12 +48,12 @@ class Tests:
 
 
 def _course_clock(cycles: FloatArray, latest: float) -> FloatArray:
-    """Clock u of the course at cycles [k] for every scale [scales, k]; where no test was made after the start, any
-    further one is at u = 1.
+    """Clock u = b(ζ)/b(T) [scales, k] of the logarithm's course at cycles ζ [k], for each scale φ of SCALES; T is
+    `latest`.
 
-    Cycles of which floats cannot hold the inverse are none.
+    Without a test after the start (T = 0) u is ζ, at most 1: the next test is at u = 1.
     """
-    if latest < 1e-300:
+    if latest < 1e-300:  # floats cannot hold the inverse of less
         return np.tile(np.minimum(cycles, 1.0), (_LOG_SCALES.size, 1))
     log_scale = (_LOG_SCALES + math.log(latest))[:, None]
     course = np.full(1, CourseForm.LOGARITHM, dtype=np.intp)

@@ -262,8 +262,10 @@ class Scene:
         velocity: FloatArray | None = None,
         pressure: FloatArray | None = None,
     ) -> FloatArray:
-        """Stationary curve S (1 + δ) [P] Nm with other cycles, velocity [m/s] > 0 or pressure [Pa] at the points. Under
-        another pressure M̄_c's law goes on BELOW the lowest that was measured: it is the same clutch there."""
+        """Torque of the stationary curve S (1 + δ) [P] Nm at the points, with their cycles, velocities [m/s] > 0 or
+        pressures [Pa] replaced by those that are given [P].
+
+        With given pressures M̄_c's law goes on BELOW the lowest that was measured: it is the same clutch there."""
         p = self.points.pressure if pressure is None else pressure
         v = self.points.velocity if velocity is None else velocity
         parameters = self.parameters

@@ -231,10 +231,12 @@ class Effect:
 
 
 def with_onset(effect: Effect) -> Effect:
-    """The effect with an onset cycle as its last shape: from the start or from a state on, the one as probable as the
-    other, and each state as probable as the next. A fault need not have been there in the first test, and were a step
-    in the template of one effect alone, any step would be taken for that effect. A step is tried with its likeliest
-    kinds of shapes, and of each with the likeliest shape: a refit moves the others."""
+    """The effect with one more shape, its onset: the cycles from which on it is at work, or FROM_THE_START.
+
+    A start before the first test has half the prior probability, the possible onsets (`Facts.onsets`) share the other
+    half. An onset is tried with the likeliest kinds of shapes alone, and of each with its likeliest shape: a refit
+    moves the others. Every effect that may set in has one, for if only one effect's template had a step, any step would
+    be taken for that effect."""
     own = len(effect.shapes)
 
     def grid(facts: Facts) -> tuple[Tried, ...]:

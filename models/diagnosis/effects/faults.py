@@ -41,6 +41,8 @@ def direction_if_both(scene: Scene, values: FloatArray) -> FloatArray:
 
 
 def _courses_over_life(facts: Facts) -> tuple[Tried, ...]:
+    """Shapes (course, value) of a gain over life: a step at each possible onset [cycles], a creep with each power of
+    CREEPS. Steps together are as probable as creeps; none with fewer than three states."""
     if facts.states.size < 3:
         return ()
     weight = -float(np.log(len(facts.onsets)))
@@ -57,6 +59,8 @@ def _gain_with_life(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
 
 
 def _courses_over_test(_: Facts) -> tuple[Tried, ...]:
+    """Shapes (time constant τ [s], whether it acts in loops) of a gain over a test's clock; τ = 0 stands for a linear
+    drift."""
     return tuple(Tried(shape=(time, in_loops)) for time in (0.0, 60.0, 150.0, 400.0) for in_loops in (0.0, 1.0))
 
 

@@ -88,7 +88,7 @@ def advise(
         narrows = distances.size_left(rows) if len(race) == 1 else 0.0
         # less than "positive" (Kass and Raftery, J. Am. Stat. Assoc. 90 (1995) 773) is no advice
         if np.isfinite(chance) and nats >= 1.0 and narrows <= criteria.MAX_LEFT:
-            effect, rival = _names(fits[0], fits[other] if len(race) > 1 else None)
+            effect, rival = _slugs_to_distinguish(fits[0], fits[other] if len(race) > 1 else None)
             advice = Advice(
                 key=key,
                 test=TRIALS[key].text,
@@ -159,12 +159,13 @@ def distinguished(nats: FloatArray, lead: FloatArray | float = 0.0) -> FloatArra
     return np.asarray(ndtr((lead + nats - odds) / sd), dtype=np.float64)
 
 
-def _names(best: PooledFit, rival: PooledFit | None) -> tuple[str, str]:
-    """An effect of the best that the rival does not have, and one of the rival."""
-    leading = [effect.effect.slug for effect in best.effects]
-    rival_names = [effect.effect.slug for effect in rival.effects] if rival is not None else []
-    distinguishing = [slug for slug in leading if slug not in rival_names] or leading
-    return distinguishing[0], next((slug for slug in rival_names if slug not in leading), BASELINE)
+def _slugs_to_distinguish(best: PooledFit, rival: PooledFit | None) -> tuple[str, str]:
+    """Slugs of the two effects that a trial would distinguish: one of the best candidate's alone (else its first), and
+    one of the rival's alone (else BASELINE)."""
+    of_best = [effect.effect.slug for effect in best.effects]
+    of_rival = [effect.effect.slug for effect in rival.effects] if rival is not None else []
+    only_best = [slug for slug in of_best if slug not in of_rival] or of_best
+    return only_best[0], next((slug for slug in of_rival if slug not in of_best), BASELINE)
 
 
 def bare(fit: PooledFit) -> PooledFit:

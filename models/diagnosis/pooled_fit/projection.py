@@ -273,9 +273,11 @@ class Reduced:
 
 
 def likely_law_sizes(reduced: Reduced) -> dict[LawSizes, float]:
-    """The sizes of the law's discrepancy of non-negligible posterior at a scatter of the gains, with their log priors,
-    likeliest first. These have more than NEGLIGIBLE_SIZES of the posterior; the best of each single value is kept too,
-    because another may be likelier beside a change."""
+    """Sizes τ of the law's discrepancy with their log priors [nats], likeliest first: those with more than
+    NEGLIGIBLE_SIZES of the posterior at this scatter of the gains.
+
+    Of each component of τ, every value is kept with the likeliest of the others, because it may be likelier beside a
+    change."""
     if reduced.gram.law is None:
         return {EXACT: 0.0}
     alone = np.r_[0 : reduced.gram.laws, -1]
@@ -295,24 +297,30 @@ def likely_law_sizes(reduced: Reduced) -> dict[LawSizes, float]:
 
 
 def projections_of(gram: Gram, noise: Noise, gains: FloatArray | None = None) -> list[Projected]:
-    """Projections at every scatter of the gains considered and at the law's likely sizes. Scatters of the runs' gains
-    are `gains`; those of the curves' go up to the next above the noise's: where the data ask for none without an
-    effect, they do not with one."""
+    """Projections at every scatter of the runs' gains in `gains` [g] (GAINS if None), at every scatter of the curves'
+    gains up to the next above the noise's, and at the law's likely sizes.
+
+    Where the data ask for no scatter of the curves without an effect, they do not with one: then none is considered."""
     place = int(np.searchsorted(criteria.CURVE_GAINS, noise.curve_gain))  # 0 for none
     curves = criteria.CURVE_GAINS[: place + 2 if place else 1]
-    return _projections(gram, noise, curves, GAINS if gains is None else gains)
+    return _projections_on_grid(gram, noise.law, GAINS if gains is None else gains, curves)
 
 
 def coarse_projections(gram: Gram, noise: Noise) -> list[Projected]:
-    """Projections at every second scatter of the runs' gains, with the curves' scatter as estimated without an effect
-    and with none, at the law's likely sizes. None, because an effect may be the reason for the curves' estimated
-    scatter."""
-    return _projections(gram, noise, sorted({noise.curve_gain, 0.0}), GAINS[::2])
+    """Projections on a coarse grid, for the many refits of a search: at every second of GAINS, at the noise's scatter of
+    the curves' gains and at none, and at the law's likely sizes.
+
+    None is considered because an effect may be the reason for the scatter that was estimated without it."""
+    return _projections_on_grid(gram, noise.law, GAINS[::2], sorted({noise.curve_gain, 0.0}))
 
 
-def _projections(gram: Gram, noise: Noise, curves: Sequence[float], gains: FloatArray) -> list[Projected]:
-    reduced = [gram.reduced(gain, curve) for curve in curves for gain in gains.tolist()]
-    best = max(reduced, key=lambda one: one.beside_law(noise.law).evidence)
+def _projections_on_grid(
+    gram: Gram, usual: LawSizes, run_gains: FloatArray, curve_gains: Sequence[float]
+) -> list[Projected]:
+    """Projections at each scatter of the runs' and of the curves' gains and each of the law's sizes that are likely at
+    the best of these scatters beside the sizes `usual`."""
+    reduced = [gram.reduced(run_gain, curve_gain) for curve_gain in curve_gains for run_gain in run_gains.tolist()]
+    best = max(reduced, key=lambda one: one.beside_law(usual).evidence)
     sizes = likely_law_sizes(best)
     return [one.beside_law(size, log_weight) for size, log_weight in sizes.items() for one in reduced]
 

@@ -77,18 +77,18 @@ def unseen_of(posterior: Posterior, visible: Sequence[Visible], raw: Sequence[Ra
 
 
 def detectable_amplitudes(posterior: Posterior) -> FloatArray:
-    """Detectable amplitude [m] of each column by the formula above, in SI units; infinite where it would be
-    absorbed."""
+    """Smallest amplitude a [m] of each screened column (an effect in one shape) that the data show at VISIBLE_POWER, by
+    the formula above, in the effect's SI unit; infinite where the baseline absorbs any amplitude."""
     columns, projections = posterior.columns, posterior.null.evidence.screened
-    best = max(projected.evidence for projected in projections)
+    best = max(projected.evidence for projected in projections)  # L*
     sd = np.array([column.effect.prior_sd for column in columns])
     odds = posterior.prior(Alternative(("",)))
-    paid = np.array([-odds - column.log_weight for column in columns]) + np.log(len(SCALES))
+    price = np.array([-odds - column.log_weight for column in columns]) + np.log(len(SCALES))
     largest = np.zeros(len(columns))
     for projected in projections:
         info, whole = screen_of(projected).info, screen_of(projected).whole
         freedom = 0.5 * np.min([np.log1p((scale * sd) ** 2 * info) for scale in SCALES], axis=0)
-        needed = 0.5 * (np.sqrt(2 * (paid + freedom)) + float(ndtri(criteria.VISIBLE_POWER))) ** 2
+        needed = 0.5 * (np.sqrt(2 * (price + freedom)) + float(ndtri(criteria.VISIBLE_POWER))) ** 2  # λ_90
         left = np.maximum(needed - best + projected.evidence, 0.0)
         shown = info > 1e-6 * whole  # the rest is rounding
         amplitude = np.sqrt(2 * left / np.where(shown, info, 1.0))

@@ -59,7 +59,7 @@ class Gain:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Held:
+class _HeldOut:
     """Held-out rows [h] of one fold, the errors of both models there [h] Nm, and the gain of log score [nats]."""
 
     rows: NDArray[np.intp]
@@ -79,8 +79,8 @@ class FittedModel:
 def measure_gain(before: FittedModel, after: FittedModel, rng: np.random.Generator) -> Gain | None:
     """The gain of a model over another, or None where there are too few states and pressures to leave out."""
     design, noise = after.problem.design, after.problem.noise
-    folds = [_held(before, after, fold) for fold in _folds(design)]
-    ahead = _ahead(design)
+    folds = [_predicted_fold(before, after, fold) for fold in _folds(design)]
+    ahead = _last_states(design)
     forecast = 0.0
     if ahead is not None:
         scores = [_forecast_score(model, ahead) for model in (before, after)]
@@ -111,7 +111,7 @@ def measure_gain(before: FittedModel, after: FittedModel, rng: np.random.Generat
     )
 
 
-def _groups(design: Design, fold: _Held) -> list[Hardest]:
+def _groups(design: Design, fold: _HeldOut) -> list[Hardest]:
     """RMS errors [Nm] of the extended model at each state, or pressure, that a fold left out."""
     groups = []
     out = np.zeros(design.torque.size, dtype=np.bool_)
@@ -127,6 +127,7 @@ def _groups(design: Design, fold: _Held) -> list[Hardest]:
 
 
 def _folds(design: Design) -> list[BoolArray]:
+    """Masks [N] of the rows that each fold leaves out: some of the states, then some of the pressures."""
     folds = []
     # readings of the open clutch hold no friction to predict: they are never left out
     states, levels = np.unique(design.rows.cycles[design.closed]), design.levels
@@ -142,7 +143,8 @@ def _folds(design: Design) -> list[BoolArray]:
     return folds
 
 
-def _ahead(design: Design) -> BoolArray | None:
+def _last_states(design: Design) -> BoolArray | None:
+    """Mask [N] of the closed clutch's rows in the last FORWARD_SHARE of the states; None with fewer than four states."""
     states = np.unique(design.rows.cycles[design.closed])
     count = max(1, round(criteria.FORWARD_SHARE * states.size))
     return design.closed & (design.rows.cycles >= states[-count]) if states.size >= 4 else None
@@ -154,45 +156,57 @@ def _without(noise: Noise, out: BoolArray) -> Noise:
 
 
 def _forecast_score(model: FittedModel, out: BoolArray) -> float:
-    """Log predictive score [nats] of held-out rows, with the uncertainty of the parameters fitted to the others
-    included."""
+    """Log predictive density [nats, up to a constant] of the rows `out` [N] under N(0, V + J P⁻¹ Jᵀ), the model refitted
+    to the others; J includes the columns of the law's discrepancy."""
     problem = model.problem
     noise = replace(problem.noise, law=EXACT)  # the law's coefficients are fitted beside the parameters
-    before = problem.with_noise(_without(problem.noise, out))
-    refit = fit(before, model.fit.laws, model.fit.effects, steps=criteria.FEW_STEPS)
+    kept = problem.with_noise(_without(problem.noise, out))
+    refit = fit(kept, model.fit.laws, model.fit.effects, steps=criteria.FEW_STEPS)
     law = np.zeros((out.size, 0)) if problem.law is None else problem.law.scaled(problem.noise.law)
     jacobian = np.column_stack([sensitivities(problem, refit), law])
     precision = problem.metric(_without(noise, out))(jacobian)
-    residual_of_out = np.column_stack([jacobian, refit.residual - law_torque(before, refit)])
-    products = problem.metric(_without(noise, ~out))(residual_of_out)
     own = precision.shape[0] - law.shape[1]
     precision[:own, :own] += prior_gram(problem.priors, refit)[:-1, :-1]
     precision[own:, own:] += np.eye(law.shape[1])
-    precision[np.diag_indices_from(precision)] *= 1.0 + 1e-12
-    scale = 1 / np.sqrt(np.diag(precision))
-    inner = (precision + products[:-1, :-1]) * scale[:, None] * scale
+    columns = np.column_stack([jacobian, refit.residual - law_torque(kept, refit)])
+    return _log_predictive(precision, problem.metric(_without(noise, ~out))(columns))
+
+
+def _log_predictive(precision: FloatArray, products: FloatArray) -> float:
+    """Log density [nats] of a residual r ~ N(0, V + J P⁻¹ Jᵀ), without the term of V's determinant, from the precision P
+    [p, p] of the parameters and the products [J, r]ᵀ V⁻¹ [J, r] [p + 1, p + 1]:
+
+    -½ (rᵀV⁻¹r - rᵀV⁻¹J (P + JᵀV⁻¹J)⁻¹ JᵀV⁻¹r) - ½ ln(det(P + JᵀV⁻¹J)/det P)
+    """
+    ridged = precision.copy()
+    ridged[np.diag_indices_from(ridged)] *= 1.0 + 1e-12  # P may be singular to rounding
+    scale = 1 / np.sqrt(np.diag(ridged))
+    inner = (ridged + products[:-1, :-1]) * scale[:, None] * scale
     along = products[:-1, -1] * scale
     quadratic = float(products[-1, -1]) - float(along @ np.linalg.solve(inner, along))
-    logdet = float(np.linalg.slogdet(inner)[1] - np.linalg.slogdet(precision * scale[:, None] * scale)[1])
+    logdet = float(np.linalg.slogdet(inner)[1] - np.linalg.slogdet(ridged * scale[:, None] * scale)[1])
     return -0.5 * (quadratic + logdet)
 
 
-def _held(before: FittedModel, after: FittedModel, out: BoolArray) -> _Held:
+def _predicted_fold(before: FittedModel, after: FittedModel, out: BoolArray) -> _HeldOut:
+    """Errors of both models at the rows `out` [N], each model refitted to the other rows."""
     errors = []
     for model in (before, after):
         masked = model.problem.with_noise(_without(model.problem.noise, out))
         refit = fit(masked, model.fit.laws, model.fit.effects, steps=criteria.FEW_STEPS)
-        bridged = _bridged(refit.laws, masked.design, out)
+        bridged = _interpolated_loop_laws(refit.laws, masked.design, out)
         if bridged is not refit.laws:
             refit = fit(masked, bridged, refit.effects, steps=0)
         errors.append(np.where(out, refit.residual - law_torque(masked, refit), 0.0))
     problem = after.problem
     squares = np.diag(problem.metric(replace(problem.noise, law=EXACT))(np.stack(errors, axis=1)))
     rows = np.flatnonzero(out)
-    return _Held(rows=rows, before=errors[0][rows], after=errors[1][rows], score=0.5 * float(squares[0] - squares[1]))
+    return _HeldOut(
+        rows=rows, before=errors[0][rows], after=errors[1][rows], score=0.5 * float(squares[0] - squares[1])
+    )
 
 
-def _bridged(laws: Laws, design: Design, out: BoolArray) -> Laws:
+def _interpolated_loop_laws(laws: Laws, design: Design, out: BoolArray) -> Laws:
     """The laws with C, at pressures whose loops were all held out, interpolated from neighbouring pressures (log C
     linear between)."""
     nodes = laws.frame.loop_pressures

@@ -93,7 +93,7 @@ def test_what_was_learned_of_single_curves_does_not_gain(plain):
     mine = np.unique(bumpy.curve[out])
     assert np.abs(sizes_of[1][mine]).max() < 0.01 * np.abs(sizes_of[0][mine]).max()
     # the control: every other row held out, the rest of each curve gives its bump away
-    by_row = held_out._held(
+    by_row = held_out._predicted_fold(
         FittedModel(problem, null), FittedModel(problem, memorised), np.arange(bumpy.torque.size) % 2 == 1
     )
     assert by_row.score > 0.25 * learned
@@ -116,7 +116,7 @@ def test_states_ahead_are_predicted_with_the_parameters_uncertainty(warm):
     priors = given.problem.priors
     noise = replace(given.problem.noise, plateaus=Correlation(), loops=Correlation(), run_gain=0.0, curve_gain=0.0)
     extended = given.extended(TEMPERATURE)
-    out = held_out._ahead(given.design)
+    out = held_out._last_states(given.design)
     for model in (given.baseline.fit, extended):
         masked = given.problem.with_noise(held_out._without(noise, out))
         found = fit(masked, model.laws, model.effects, steps=FEW_STEPS)
@@ -153,14 +153,15 @@ def test_loops_at_a_pressure_held_out_take_c_from_its_neighbours():
     out = given.design.level == nodes[2]
     wild = given.baseline.fit.laws.theta.copy()
     wild[ATTRACTOR + 2] += 5.0
-    laws = held_out._bridged(replace(given.baseline.fit.laws, theta=wild), given.design, out)
+    laws = held_out._interpolated_loop_laws(replace(given.baseline.fit.laws, theta=wild), given.design, out)
     between = np.interp(nodes[2], nodes[[1, 3]], wild[[ATTRACTOR + 1, ATTRACTOR + 3]])
     assert laws.theta[ATTRACTOR + 2] == pytest.approx(between)
     assert np.array_equal(np.delete(laws.theta, ATTRACTOR + 2), np.delete(wild, ATTRACTOR + 2))
     # held out by state, every pressure has loops left: nothing is touched
     by_state = given.design.rows.cycles == 5000.0
     assert np.array_equal(
-        held_out._bridged(given.baseline.fit.laws, given.design, by_state).theta, given.baseline.fit.laws.theta
+        held_out._interpolated_loop_laws(given.baseline.fit.laws, given.design, by_state).theta,
+        given.baseline.fit.laws.theta,
     )
 
 
