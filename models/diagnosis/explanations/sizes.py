@@ -13,12 +13,16 @@ with their probability, with what may be beside them; what is left to one is not
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from models.arrays import FloatArray
 from models.diagnosis import criteria
-from models.diagnosis.effects.effect import Tried
+from models.diagnosis.design.design import Design
+from models.diagnosis.design.facts import Facts
+from models.diagnosis.effects.effect import Shape, Tried
 from models.diagnosis.effects.fitted_effect import Draw, FittedEffect
 from models.diagnosis.explanations.amplitude_posterior import Proportional
 from models.diagnosis.explanations.evidence import evidence_of, template_error_columns, template_error_factors
@@ -27,6 +31,8 @@ from models.diagnosis.pooled_fit.gauss_newton import PooledFit, fit
 from models.diagnosis.pooled_fit.problem import FitProblem
 from models.diagnosis.pooled_fit.projection import Gram, Projected, Reduced, coarse_projections, gram_of
 from models.gaussian_evidence import log_sum
+
+BoolArray: TypeAlias = NDArray[np.bool_]
 
 #: Values of an amplitude that stand for its density.
 _AMPLITUDES = 200
@@ -100,7 +106,9 @@ def sizes_of(problem: FitProblem, judgement: Judgement, rng: np.random.Generator
     """Posterior sizes of a judgement's causes, and DRAWS draws or fewer of equal weight; none where nothing was
     fitted."""
     components = [
-        component for fitted, share in _shares(judgement) for component in _components(problem, fitted, share, rng)
+        component
+        for fitted, share in _shares(judgement)
+        for component in _components_of_courses(problem, fitted, share, rng)
     ]
     if not components:
         return Sizes(by_slug={})
@@ -156,7 +164,7 @@ def _size(sizes: FloatArray) -> Size:
     )
 
 
-def _components(
+def _components_of_courses(
     problem: FitProblem, original: PooledFit, share: float, rng: np.random.Generator
 ) -> Iterator[_Component]:
     """Components of the posterior of a fit's effects, refitted under each of their courses and weighted by evidence;
@@ -165,49 +173,56 @@ def _components(
     flat = [replace(e.effect, tails=min(e.effect.tails, criteria.SIZE_TAILS)) for e in original.effects]
     effects = [replace(e, effect=effect) for e, effect in zip(original.effects, flat, strict=True)]
     fitted = replace(original, effects=tuple(effects))
-    courses = list(_courses(problem, fitted))
+    courses = list(_course_refits(problem, fitted))
     if not courses:
         courses = [(0.0, fit(problem, fitted.laws, fitted.effects, steps=criteria.FEW_STEPS))]
     logs = np.array([log for log, _ in courses])
     weights = np.exp(logs - logs.max())
     for weight, (_, fitted) in zip((share * weights / weights.sum()).tolist(), courses, strict=True):
         if weight > share / criteria.SIZES_SAMPLED:
-            yield from _components_of(problem, fitted, weight, rng)
+            yield from _components_about(problem, fitted, weight, rng)
 
 
-def _courses(problem: FitProblem, fitted: PooledFit) -> Iterator[tuple[float, PooledFit]]:
-    """Log weight [nats] and refit of every course of non-negligible weight. Of each kind the course most like the
-    fitted one is refitted first, and then its neighbours as long as their weights count."""
+def _course_refits(problem: FitProblem, fitted: PooledFit) -> Iterator[tuple[float, PooledFit]]:
+    """Refits with each effect in turn under its other courses, and their log weights [nats], without negligible ones.
+
+    Of each kind of course the one most like the fitted one is refitted first, and then its neighbours as long as their
+    weights count."""
     best = -np.inf
     for place, effect in enumerate(fitted.effects):
-        if effect.effect.courses is None:
-            continue
-        refittable = replace(
-            effect.effect,
-            shapes=tuple(replace(shape, smooth=shape.smooth and not shape.held) for shape in effect.effect.shapes),
-        )
-        kinds: dict[float, list[Tried]] = {}  # by the first of the shapes
-        for one in effect.effect.courses(problem.design.facts):
-            kinds.setdefault(one.shape[0], []).append(one)
-        for kind in kinds.values():
+        for kind in _kinds_of_courses(effect, problem.design.facts):
             first = _most_alike(fitted, effect, kind)
             for way in (range(first, len(kind)), range(first - 1, -1, -1)):
-                near, laws = fitted.effects, fitted.laws
+                near = fitted
                 for index in way:
-                    shape = _with_free(kind[index].shape, effect)
-                    tried = replace(near[place], effect=refittable, shape=shape)
-                    refit = fit(problem, laws, (*near[:place], tried, *near[place + 1 :]), steps=criteria.FEW_STEPS)
+                    refit = _refit_under(problem, near, place, _with_free(kind[index].shape, effect))
                     if not np.isfinite(refit.cost) or refit.wrong_sign:
                         break
                     log = evidence_of(problem, refit, smooth=False).whole + kind[index].log_weight
                     best = max(best, log)
                     if log < best - 10.0:  # e^-10
                         break
-                    near, laws = refit.effects, refit.laws
+                    near = refit
                     yield log, refit
 
 
-def _with_free(shape: tuple[float, ...], fitted: FittedEffect) -> tuple[float, ...]:
+def _kinds_of_courses(fitted: FittedEffect, facts: Facts) -> list[list[Tried]]:
+    """Courses over life under which an effect may be refitted, by kind (the first of the shapes); empty without any."""
+    kinds: dict[float, list[Tried]] = {}
+    for tried in fitted.effect.courses(facts) if fitted.effect.courses is not None else ():
+        kinds.setdefault(tried.shape[0], []).append(tried)
+    return list(kinds.values())
+
+
+def _refit_under(problem: FitProblem, near: PooledFit, place: int, shape: Shape) -> PooledFit:
+    """The fit from `near` with the effect at that place in this shape, in which the shapes that are held stay."""
+    effects, fitted = near.effects, near.effects[place]
+    shapes = tuple(replace(one, smooth=one.smooth and not one.held) for one in fitted.effect.shapes)
+    tried = replace(fitted, effect=replace(fitted.effect, shapes=shapes), shape=shape)
+    return fit(problem, near.laws, (*effects[:place], tried, *effects[place + 1 :]), steps=criteria.FEW_STEPS)
+
+
+def _with_free(shape: Shape, fitted: FittedEffect) -> Shape:
     """The shape of a course; if it is of the fitted kind, with the fitted values of the smooth shapes that are not
     held."""
     if shape[0] != fitted.shape[0]:
@@ -225,7 +240,7 @@ def _most_alike(fitted: PooledFit, effect: FittedEffect, kind: Sequence[Tried]) 
     return int(np.argmax(along))
 
 
-def _that_count(whole: Gram, gram: Gram, problem: FitProblem) -> Iterator[Projected]:
+def _likely_projections(whole: Gram, gram: Gram, problem: FitProblem) -> Iterator[Projected]:
     """Projections of a fit's effects at each scatter of the gains and size of the law with at least NEGLIGIBLE of the
     posterior about the fit."""
     about = coarse_projections(whole, problem.noise)
@@ -239,32 +254,28 @@ def _that_count(whole: Gram, gram: Gram, problem: FitProblem) -> Iterator[Projec
             yield reduced[gains].beside_law(projected.sizes, projected.log_weight)
 
 
-def _components_of(
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _TemplateErrors:
+    """Errors of the templates of a fit's effects at the rows."""
+
+    factors: list[FloatArray]  # φ [N, m] of each effect
+    uncertain: FloatArray  # [Σ m] 1 for each factor of an effect's own discrepancy, 0 for the small ones
+    columns: FloatArray  # [N, Σ m] Nm, the change of torque by a unit of each
+
+
+def _components_about(
     problem: FitProblem, fitted: PooledFit, weight: float, rng: np.random.Generator
 ) -> Iterator[_Component]:
-    """Mixture components of a refit, one for each non-negligible combination of scatter of the gains, size of the law
-    and size of the templates' errors."""
-    design, free = problem.design, int(problem.priors.free.sum())
+    """Components of the mixture about a refit of that weight: sampled amplitudes with a normal of all else about each,
+    for each non-negligible combination of scatter of the gains, size of the law and size of the templates' errors."""
+    design, effects = problem.design, fitted.effects
     factors, uncertain = template_error_factors(design, fitted)
-    errors = template_error_columns(design, fitted, factors)
-    whole_gram = gram_of(problem, fitted, errors)
-    gram = replace(whole_gram, base=whole_gram.laws + free)
-    effects, places = fitted.effects, np.arange(len(fitted.effects))
-    priors = [np.array([np.inf, *(effect.precisions[1:] ** -0.5)]) for effect in effects]
-    of_shapes, of_errors = [prior.size for prior in priors], [off.shape[1] for off in factors]
-    shapes, of = np.concatenate(priors), np.concatenate([np.repeat(places, of_shapes), np.repeat(places, of_errors)])
-    supposed = []
-    for projected in _that_count(whole_gram, gram, problem):
-        info = projected.info.copy()
-        info[np.diag_indices(shapes.size)] -= np.where(np.isinf(shapes), 0.0, shapes**-2.0)  # their priors stand in sd
-        for size in criteria.TEMPLATE_ERRORS:
-            sd = np.concatenate([shapes, np.where(uncertain > 0, *size)])
-            one = Proportional(info=info, score=projected.score, sd=sd, of=of, effects=effects)
-            supposed.append((projected.evidence + one.log_integral(), one))
-    steady = design.closed & design.rows.steady
-    states = design.rows.cycles[steady]
-    last, first = steady & (design.rows.cycles == states.max()), steady & (design.rows.cycles == states.min())
-    columns = np.concatenate([*(e.columns(design, fitted.prediction) for e in effects), errors], axis=1)
+    errors = _TemplateErrors(
+        factors=factors, uncertain=uncertain, columns=template_error_columns(design, fitted, factors)
+    )
+    supposed = _amplitude_posteriors(problem, fitted, errors)
+    last, first = _end_states(design)
+    columns = np.concatenate([*(e.columns(design, fitted.prediction) for e in effects), errors.columns], axis=1)
     whole = np.sum([effect.rows(design, fitted.prediction) for effect in effects], axis=0)
     rising = columns[last].mean(axis=0) - columns[first].mean(axis=0)
     trend = float(whole[last].mean() - whole[first].mean())
@@ -279,3 +290,32 @@ def _components_of(
                 rises = rising * one.ratio(sample)
                 part = share / count ** len(effects)
                 yield _Component(weight=part, fit=fitted, mean=mean, root=root, trend=(trend, rises), last=at_end)
+
+
+def _amplitude_posteriors(
+    problem: FitProblem, fitted: PooledFit, errors: _TemplateErrors
+) -> list[tuple[float, Proportional]]:
+    """Log evidence [nats] and posterior of the amplitudes under each likely scatter of the gains and size of the law,
+    and each size of the templates' errors (TEMPLATE_ERRORS)."""
+    whole_gram = gram_of(problem, fitted, errors.columns)
+    gram = replace(whole_gram, base=whole_gram.laws + int(problem.priors.free.sum()))
+    effects, places = fitted.effects, np.arange(len(fitted.effects))
+    priors = [np.array([np.inf, *(effect.precisions[1:] ** -0.5)]) for effect in effects]
+    of_shapes, of_errors = [prior.size for prior in priors], [off.shape[1] for off in errors.factors]
+    shapes, of = np.concatenate(priors), np.concatenate([np.repeat(places, of_shapes), np.repeat(places, of_errors)])
+    supposed = []
+    for projected in _likely_projections(whole_gram, gram, problem):
+        info = projected.info.copy()
+        info[np.diag_indices(shapes.size)] -= np.where(np.isinf(shapes), 0.0, shapes**-2.0)  # their priors stand in sd
+        for size in criteria.TEMPLATE_ERRORS:
+            sd = np.concatenate([shapes, np.where(errors.uncertain > 0, *size)])
+            one = Proportional(info=info, score=projected.score, sd=sd, of=of, effects=effects)
+            supposed.append((projected.evidence + one.log_integral(), one))
+    return supposed
+
+
+def _end_states(design: Design) -> tuple[BoolArray, BoolArray]:
+    """Masks [N] of the closed clutch's plateaus at the last state and at the first."""
+    steady = design.closed & design.rows.steady
+    states = design.rows.cycles[steady]
+    return steady & (design.rows.cycles == states.max()), steady & (design.rows.cycles == states.min())
