@@ -8,6 +8,7 @@ made; where a raw record was sent, it is kept beside them as evidence of what ha
 import math
 from dataclasses import dataclass, field
 from enum import StrEnum
+from typing import TypeVar
 
 from models.clutch import Geometry
 from models.records.runs import Plateaus, Record
@@ -61,6 +62,10 @@ class DynamicRun:
     cycles: float
     record: Record
     moment: float | None = None
+
+
+#: One of the two kinds of test, the same throughout a signature.
+TestRun = TypeVar("TestRun", StationaryRun, DynamicRun)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -114,6 +114,7 @@ def thinned(campaign: Campaign, notes: list[str]) -> Campaign:
 
 
 def _evenly(states: FloatArray, count: int) -> set[float]:
+    """So many of the states, evenly among them, the first and the last included."""
     return set(states[np.linspace(0, states.size - 1, count).round().astype(int)].tolist())
 
 
@@ -171,41 +172,21 @@ class Design:
 
 
 def build_design(campaign: Campaign) -> Design:
-    """The design of all rows of a campaign. Never raises on a campaign that is valid by itself; it may have no rows."""
+    """The points, rows and facts of a campaign, thinned where it is too large.
+
+    Never raises on a campaign that is valid by itself; it may have no rows."""
     notes: list[str] = []
-    thinned_campaign = thinned(campaign, notes)
-    runs: list[StationaryRun | DynamicRun] = []
-    blocks = [points_of(0)]
-    torques = [np.zeros(0)]
-    plateaus = 0
-    for run in thinned_campaign.stationary:
-        points, torque = _plateaus(run, thinned_campaign, len(runs), plateaus, notes)
-        if torque.size:
-            runs.append(run)
-            blocks.append(points)
-            torques.append(torque)
-            plateaus += torque.size
-    loops: list[BinnedLoop] = []
-    reasons: list[str] = []  # why a dynamic test gave no loop at all
-    for dynamic in thinned_campaign.dynamic:
-        test_loops, sentences = binned_loops(dynamic.record, thinned_campaign.geometry)
-        notes.extend(f"{dynamic.run_id}: {sentence}" for sentence in sentences)
-        reasons += sentences[:1] if not test_loops else []
-        for loop in test_loops:
-            blocks.append(_loop_points(loop, dynamic, len(runs), len(loops)))
-            loops.append(loop)
-        if test_loops:
-            runs.append(dynamic)
-    if reasons:
-        count = f"{len(reasons)} of {len(thinned_campaign.dynamic)} ({reasons[0].rstrip('.')})"
-        notes.append(f"Dynamic tests that could not be evaluated and were left out: {count}.")
-    columns = {field.name: [getattr(block, field.name) for block in blocks] for field in fields(Points)}
-    points = mark_open(Points(**{name: np.concatenate(parts) for name, parts in columns.items()}))
-    binned, filled, offsets = (
+    used = thinned(campaign, notes)
+    tests = _stationary_tests(used, notes)
+    plateaus = sum(torque.size for _, _, torque in tests)
+    runs: list[StationaryRun | DynamicRun] = [run for run, _, _ in tests]
+    loops, loop_points = _loops(used, runs, notes)
+    points = mark_open(_joined([points_of(0), *(block for _, block, _ in tests), *loop_points]))
+    torque, samples, offsets = (
         np.concatenate([np.zeros(0), *(getattr(loop, name) for loop in loops)])
         for name in ("torque", "samples", "bin_offset")
     )
-    bins = np.flatnonzero(filled > 0)
+    bins = np.flatnonzero(samples > 0)
     per_bin = PHASES // BINS
     middle = plateaus + bins * per_bin + per_bin // 2
     rows = points.take(np.concatenate([np.arange(plateaus), middle]).astype(np.intp))
@@ -215,8 +196,8 @@ def build_design(campaign: Campaign) -> Design:
     return Design(
         points=points,
         rows=rows,
-        torque=np.concatenate([*torques, binned[bins]]),
-        samples=np.concatenate([np.ones(plateaus), filled[bins]]),
+        torque=np.concatenate([np.zeros(0), *(at_plateaus for _, _, at_plateaus in tests), torque[bins]]),
+        samples=np.concatenate([np.ones(plateaus), samples[bins]]),
         level=level,
         curve=np.asarray(curve, dtype=np.intp).reshape(-1),
         bins=np.asarray(bins, dtype=np.intp),
@@ -227,9 +208,50 @@ def build_design(campaign: Campaign) -> Design:
         loops=len(loops),
         bin_autocorrelation=bin_autocorrelation([loop.autocorrelation for loop in loops]),
         runs=tuple(runs),
-        facts=replace(facts_of(thinned_campaign), shortest_period=_shortest(points)),
+        facts=replace(facts_of(used), shortest_period=_shortest(points)),
         notes=tuple(notes),
     )
+
+
+def _stationary_tests(campaign: Campaign, notes: list[str]) -> list[tuple[StationaryRun, Points, FloatArray]]:
+    """Stationary runs that have plateaus in motion, with their points [n] and folded torque [n] Nm; `notes` gets a
+    sentence on omitted plateaus."""
+    tests: list[tuple[StationaryRun, Points, FloatArray]] = []
+    rows = 0
+    for run in campaign.stationary:
+        points, torque = _plateaus(run, campaign, len(tests), rows, notes)
+        if torque.size:
+            tests.append((run, points, torque))
+            rows += torque.size
+    return tests
+
+
+def _loops(
+    campaign: Campaign, runs: list[StationaryRun | DynamicRun], notes: list[str]
+) -> tuple[list[BinnedLoop], list[Points]]:
+    """Loops of the dynamic runs, and the points [PHASES] of each. `runs` gets the runs that have loops; `notes` sentences
+    on what was left out."""
+    loops: list[BinnedLoop] = []
+    points: list[Points] = []
+    reasons: list[str] = []  # why a dynamic test gave no loop at all
+    for run in campaign.dynamic:
+        test_loops, sentences = binned_loops(run.record, campaign.geometry)
+        notes.extend(f"{run.run_id}: {sentence}" for sentence in sentences)
+        reasons += sentences[:1] if not test_loops else []
+        points += [_loop_points(loop, run, len(runs), len(loops) + k) for k, loop in enumerate(test_loops)]
+        loops += test_loops
+        if test_loops:
+            runs.append(run)
+    if reasons:
+        count = f"{len(reasons)} of {len(campaign.dynamic)} ({reasons[0].rstrip('.')})"
+        notes.append(f"Dynamic tests that could not be evaluated and were left out: {count}.")
+    return loops, points
+
+
+def _joined(blocks: list[Points]) -> Points:
+    """All blocks of points, one after the other."""
+    columns = {field.name: [getattr(block, field.name) for block in blocks] for field in fields(Points)}
+    return Points(**{name: np.concatenate(parts) for name, parts in columns.items()})
 
 
 def _shortest(points: Points) -> float | None:
@@ -241,6 +263,7 @@ def _shortest(points: Points) -> float | None:
 def _period_differences(
     loops: list[BinnedLoop], bins: IntArray, plateaus: int
 ) -> Iterator[tuple[IntArray, FloatArray]]:
+    """Rows [n] of each loop, and how each of its further periods differs there [n] Nm (`loop_bins`)."""
     for number, loop in enumerate(loops):
         first, last = np.searchsorted(bins, [number * BINS, (number + 1) * BINS])
         for differences in loop.period_differences[:, bins[first:last] - number * BINS]:

@@ -13,7 +13,7 @@ from models.diagnosis.campaign import Campaign, DutyRun, DynamicRun, EventKind, 
 from models.records.criteria import UNLOADED
 from models.records.runs import Plateaus, Record, plate_rise
 
-Run: TypeAlias = StationaryRun | DynamicRun | DutyRun
+TestOrDuty: TypeAlias = StationaryRun | DynamicRun | DutyRun
 #: The facts that amplitudes and their priors refer to: they stay those of the campaign that was diagnosed.
 REFERENCES = ("reference_temperature", "usual_torque", "usual_pressure")
 
@@ -145,7 +145,7 @@ def _long_gaps(campaign: Campaign) -> list[tuple[float, float, float]]:
     after it.
 
     Idle is the time between two runs less what the engagements between them took, at the pace of the fast blocks."""
-    runs: list[Run] = [*campaign.tests, *campaign.duty]
+    runs: list[TestOrDuty] = [*campaign.tests, *campaign.duty]
     timed = [(run.moment, run) for run in runs if run.moment is not None]
     timed.sort(key=lambda moment_and_run: (moment_and_run[0], moment_and_run[1].cycles))
     if len(timed) < 4:
@@ -162,7 +162,9 @@ def _long_gaps(campaign: Campaign) -> list[tuple[float, float, float]]:
     ]
 
 
-def _idle_time(gaps: FloatArray, timed: list[tuple[float, Run]], gap_follows_block: bool) -> tuple[float, FloatArray]:
+def _idle_time(
+    gaps: FloatArray, timed: list[tuple[float, TestOrDuty]], gap_follows_block: bool
+) -> tuple[float, FloatArray]:
     """Time [s] of one engagement, and the idle time [n] s of the gaps [n] s without engagements. A block's engagements
     lie in the gap after its moment, or in the one before it; engagements that were not sent lie between two tests."""
     engagements = np.zeros(gaps.size)

@@ -9,14 +9,13 @@ As a protocol that a rig can run a trial is its steps in order, with what is to 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import TypeVar
 
 import numpy as np
 from scipy.constants import zero_Celsius
 
 from models.arrays import FloatArray
 from models.diagnosis import criteria
-from models.diagnosis.campaign import Campaign, DutyRun, DynamicRun, EventKind, MaintenanceEvent, StationaryRun
+from models.diagnosis.campaign import Campaign, DutyRun, DynamicRun, EventKind, MaintenanceEvent, StationaryRun, TestRun
 from models.records.criteria import UNLOADED
 from models.records.pressure_levels import levels_of
 from models.records.runs import Plateaus, Record
@@ -27,8 +26,6 @@ _FREQUENCY, _SAMPLES = 0.3, 200
 LIGHT = (1.0, 1.5, 2.0)
 #: Sweeps over the speeds in a run with the clutch open: there is one pressure only, none.
 PASSES = 5
-
-Run = TypeVar("Run", StationaryRun, DynamicRun)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -184,7 +181,7 @@ def with_trial(campaign: Campaign, key: str) -> Campaign | None:
     return replace(added, maintenance=(*campaign.maintenance, *rests))
 
 
-def _usual(runs: Sequence[tuple[Run, Plateaus | Record]], trial: Trial) -> Run | None:
+def _usual(runs: Sequence[tuple[TestRun, Plateaus | Record]], trial: Trial) -> TestRun | None:
     """The last run under the usual pressures, excluding runs that a trial at light pressures or none has added; None
     where the trial's share of its lowest pressure would leave the clutch open."""
     highest = max((float(table.pressure.max()) for _, table in runs), default=0.0)

@@ -99,8 +99,8 @@ def starts(columns: Sequence[Column], screened: Sequence[Projected]) -> dict[str
 
 #: By slug, in order, the shapes of an alternative's effects that a refit does not move; an alternative that is promised, in
 #: one of them.
-Kinds: TypeAlias = tuple[tuple[str, Shape], ...]
-Key: TypeAlias = tuple[Alternative, Kinds]
+ShapeKinds: TypeAlias = tuple[tuple[str, Shape], ...]
+Key: TypeAlias = tuple[Alternative, ShapeKinds]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -114,7 +114,7 @@ class Node:
     promise: float  # what it had been promised to be
 
     @property
-    def kind(self) -> Kinds:
+    def kind(self) -> ShapeKinds:
         """The kind of the effects' shapes, by slug: the values of the shapes that a refit does not move."""
         return tuple(sorted((e.effect.slug, e.effect.stiff(e.shape)) for e in self.fit.effects))
 

@@ -15,12 +15,11 @@ import math
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import TypeVar
 
 import numpy as np
 
 from models.diagnosis import criteria
-from models.diagnosis.campaign import Campaign, DynamicRun, StationaryRun
+from models.diagnosis.campaign import Campaign, TestRun
 from models.diagnosis.effects.catalogue import CATALOGUE
 from models.diagnosis.effects.fitted_effect import AmplitudeEstimate
 from models.diagnosis.effects.moving import SHAFT_RIPPLE, STICK_SLIP
@@ -37,8 +36,6 @@ from models.records.runs import Record
 LEAST_EVIDENCE = math.log((1 / criteria.ANYTHING_WRONG - 1) * len(CATALOGUE) / (1 - criteria.UNCATALOGUED_SHARE))
 #: A line of one frequency at all speeds, or a swing of a kind that the catalogue lacks: structure without a name.
 FIXED_LINE = "fixed_line"
-
-Run = TypeVar("Run", StationaryRun, DynamicRun)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,7 +64,7 @@ def raw_evidence(campaign: Campaign, without: frozenset[str] = frozenset()) -> t
     return (*nameless, *(_unsettled(dwells) if UNSETTLED_DWELL.slug not in without else ()))
 
 
-def _evenly(runs: Sequence[tuple[Run, Record]]) -> Sequence[tuple[Run, Record]]:
+def _evenly(runs: Sequence[tuple[TestRun, Record]]) -> Sequence[tuple[TestRun, Record]]:
     """Runs spread evenly over life, as many as the limit on samples allows."""
     usual = float(np.median([record.time.size for _, record in runs])) if runs else 1.0
     most = max(8, int(300_000 / usual))  # eight at least, more where they hold fewer than 300,000 samples in all

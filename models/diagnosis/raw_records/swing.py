@@ -207,23 +207,32 @@ def _demodulated(
 
 
 def _powers(order: Demodulated, size: FloatArray, firsts: IntArray) -> tuple[FloatArray, FloatArray]:
-    """Power u and weight N of the groups in which the order is visible."""
+    """Power u [v] and weight N [v] of the groups in which the order is visible, D summed over a group's stretches."""
     total, weight = np.add.reduceat(order[0] * size, firsts), np.add.reduceat(order[1] * size**2, firsts)
     visible = weight > 0
     return np.abs(total[visible]) ** 2 / weight[visible], weight[visible]
 
 
-def _line_at_order(demodulated: dict[float, Demodulated], order: float, size: FloatArray, firsts: IntArray) -> Line:
-    """The line at an order, with its evidence, for a relative amplitude `size` [b] and a phase kept within the
-    groups."""
-    power, weight = _powers(demodulated[order], size, firsts)
-    if power.size < 4:
-        return Line()
-    noise = 0.0  # that of the louder side
+def _noise_beside_order(
+    demodulated: dict[float, Demodulated], order: float, size: FloatArray, firsts: IntArray
+) -> float:
+    """Noise level beside an order, as a multiple of the expected one: the mean of u at the orders on its louder side,
+    shrunk towards 1 by PRIOR_STRETCHES."""
+    level = 0.0
     for side in (-1.0, 1.0):
         neighbours = [_powers(demodulated[round(order + side * offset, 1)], size, firsts)[0] for offset in _BESIDE]
         total, count = sum(float(values.sum()) for values in neighbours), sum(values.size for values in neighbours)
-        noise = max(noise, (total + PRIOR_STRETCHES) / (count + PRIOR_STRETCHES))
+        level = max(level, (total + PRIOR_STRETCHES) / (count + PRIOR_STRETCHES))
+    return level
+
+
+def _line_at_order(demodulated: dict[float, Demodulated], order: float, size: FloatArray, firsts: IntArray) -> Line:
+    """The swing at a shaft order as a line with its evidence: relative amplitude `size` [b] in the stretches, phase kept
+    within groups of stretches that begin at `firsts` [g]. No line where fewer than four groups show the order."""
+    power, weight = _powers(demodulated[order], size, firsts)
+    if power.size < 4:
+        return Line()
+    noise = _noise_beside_order(demodulated, order, size, firsts)
     logs = log_likelihood_ratios(power / noise, weight / noise, trial_amplitudes(weight / noise))
     return Line(
         evidence=float(logsumexp(logs, b=AMPLITUDE_WEIGHTS)),
@@ -301,13 +310,15 @@ def windows_of(
 def _matched_spectrum(
     record: WhitenedRecord, first: int, stop: int, frequency: FloatArray
 ) -> tuple[IntArray, ComplexArray, FloatArray]:
-    """Indices of the frequencies [f] Hz that the record shows in the window of samples [first, stop), and D and N
-    there."""
+    """Matched spectrum of the record in the window of samples [first, stop): the indices [b] of the frequencies [f] Hz
+    that it shows, and the matched sum D [b] and the weight N [b] of each (`whitened_torque`).
+
+    The swing is taken to rise from nothing with the time constant _RISE_SECONDS."""
     inside = (frequency > _COMPARED_ABOVE * record.lowest) & (frequency < record.highest)
     size = round(1.0 / (_SPACING * record.step))
     slot = np.minimum(np.round((record.time[first:stop] - record.time[first]) / record.step).astype(int), size - 1)
     envelope = -np.expm1(-np.arange(stop - first) * (record.step / _RISE_SECONDS))
-    spectrum = np.fft.rfft(np.bincount(slot, record.matched[first:stop] * envelope, size))
+    spectrum = np.fft.rfft(np.bincount(slot, record.matched[first:stop] * envelope, size))  # one bin a _SPACING
     bins = np.flatnonzero(inside[: spectrum.size])
     weight = float(record.weight[first:stop] @ envelope**2) * record.response(frequency[bins])
     return bins, spectrum[bins], weight
