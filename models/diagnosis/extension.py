@@ -223,6 +223,7 @@ def _arrays_of(kind: type[Facts | Frame | LawForm], stored: Mapping[str, Any]) -
 
 
 def _laws(stored: Mapping[str, Any]) -> Laws:
+    """The laws with their frame and learned discrepancy, from their stored form."""
     frame, learned = Frame(**_arrays_of(Frame, stored["frame"])), stored["learned"]
     return Laws(
         theta=np.array(stored["theta"], dtype=np.float64),

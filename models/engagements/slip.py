@@ -123,7 +123,8 @@ def _fitted(moment: FloatArray, values: FloatArray, inflation: float) -> ValueWi
 
 
 def _least_squares(design: FloatArray, values: FloatArray, inflation: float) -> tuple[ValueWithError, ValueWithError]:
-    """The first and the last coefficient of a least-squares fit, with standard errors."""
+    """First and last coefficient of the least-squares fit of values [n] by a design [n, k], with standard errors; the
+    noise's variance counts `inflation` times, because it is autocorrelated."""
     inverse = np.linalg.pinv(design.T @ design)
     coefficients = inverse @ (design.T @ values)
     residual = values - design @ coefficients

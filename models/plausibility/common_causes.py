@@ -119,6 +119,7 @@ def _parted(runs: Sequence[Run], near: Sequence[int], dated: Sequence[_Dated], c
 
 
 def _by_date(runs: Sequence[Run]) -> list[_Dated]:
+    """The dated runs, ascending by date."""
     dated = [
         _Dated(index=index, moment=run.moment, start=run.cycles - (run.block or 0.0), end=run.cycles, is_test=run.tests)
         for index, run in enumerate(runs)
@@ -197,6 +198,8 @@ def _usual_rate(dated: Sequence[_Dated]) -> float | None:
 
 
 def _hypotheses(dated: Sequence[_Dated]) -> Iterator[CommonCause]:
+    """Common causes that the order of the dated runs suggests: cycles off from a run on, a counter that stood still,
+    runs of another clutch."""
     furthest, fast = 0.0, {k for k, z in _excess(dated) if z > criteria.FAST}
     asked = 0
     for k, run in enumerate(dated):

@@ -18,9 +18,9 @@ def believed_dates(cycles: Sequence[float], moments: Sequence[float]) -> list[in
     order = sorted(range(len(cycles)), key=lambda run: (cycles[run], moments[run]))
     rise = longest_rise([moments[run] for run in order])
     kept = [run for place, run in enumerate(order) if place in rise]
-    while odd := _odd(_rates(cycles, moments, kept)):
+    while suspects := _suspects(_rates(cycles, moments, kept)):
         kept = min(
-            (kept[:place] + kept[place + 1 :] for place in odd), key=lambda way: max(_rates(cycles, moments, way))
+            (kept[:place] + kept[place + 1 :] for place in suspects), key=lambda way: max(_rates(cycles, moments, way))
         )
     return kept
 
@@ -34,8 +34,9 @@ def _rates(cycles: Sequence[float], moments: Sequence[float], kept: Sequence[int
     return rates
 
 
-def _odd(rates: Sequence[float]) -> list[int]:
-    """The places of runs of which one has a date that is not believed, by the pace up to each run but the first."""
+def _suspects(rates: Sequence[float]) -> list[int]:
+    """Places of the runs one of which has a wrong date, from the rates [n - 1] of cycles a second up to each run but the
+    first; empty where the rates agree within the factor FASTER."""
     steps = [(rate, place) for place, rate in enumerate(rates) if rate > 0.0]
     if len(steps) <= criteria.FEWEST_RATES:
         return []

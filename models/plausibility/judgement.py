@@ -84,7 +84,7 @@ def judge(runs: Sequence[Run], about: Collection[int] = ()) -> JointJudgement:
     """
     clutch = _Clutch(runs=tuple(runs), about=frozenset(about))
     best, weighed = _searched(clutch)
-    held_runs = _held(clutch, best, weighed)
+    held_runs = _verdicts_on_slips(clutch, best, weighed)
     levels = best.belief.levels & clutch.followed
     return JointJudgement(held=held_runs, tests=clutch.followed, levels=levels - held_runs.keys())
 
@@ -102,8 +102,9 @@ def log_cycles_of(runs: Sequence[Run]) -> float:
     return float(clutch.log_cycles(clutch.cycles[None, clutch.near])[0])
 
 
-def _held(clutch: "_Clutch", best: "_Weighed", weighed: dict[Belief, float]) -> dict[int, SlipVerdict]:
-    """Verdicts on the runs that probably slipped, by the beliefs visited by the search."""
+def _verdicts_on_slips(clutch: "_Clutch", best: "_Weighed", weighed: dict[Belief, float]) -> dict[int, SlipVerdict]:
+    """Verdict on each run whose odds of a slip are at least HELD, by its index. The odds are those of all beliefs that
+    the search has `weighed`, to which the nearest alternatives to the best one are added."""
     weighed |= {other: _Weighed(clutch=clutch, belief=other).log_probability for other in best.instead()}
     doubts = any(log_odds >= math.log(criteria.HELD) for log_odds in best.log_odds.values())
     if not (best.belief.slipped or doubts or len(weighed) > 1):
@@ -220,6 +221,7 @@ class _Clutch:
         return sorted(set(range(len(self.runs))) - far)
 
     def _nearest(self, indices: Sequence[int], most: int) -> list[int]:
+        """So many of the runs' indices, those nearest to the runs asked about and to the latest one, ascending."""
         if len(indices) <= most:
             return list(indices)
         nearest = np.argsort(self._apart(indices), kind="stable")
@@ -437,6 +439,7 @@ class _Weighed:
         return latest + (float(gaps[-1]) if gaps.size else 0.0)
 
     def _of_kind(self, index: int) -> FloatArray:
+        """Distinct cycles of the other runs nearby that are of this run's kind and did not slip, ascending."""
         kind, near = self.clutch.runs[index].kind, [i for i in self.clutch.near if i not in self.belief.slipped]
         same_kind = [i for i in near if i != index and self.clutch.runs[i].kind == kind]
         return np.unique(self.clutch.cycles[same_kind]) if same_kind else np.zeros(0)
@@ -449,6 +452,8 @@ class _Weighed:
         return self._weighed_slips[index]
 
     def _slip_of(self, index: int) -> tuple[float, float, Slip] | None:
+        """Log probability [nats] of a run as sent, that of all its possible slips together, and the likeliest slip;
+        None without a possible slip."""
         run = self.clutch.runs[index]
         slips = self.clutch.slips(index, self.expected(index))
         if all(fitted_tests in ([], [index]) for _, fitted_tests in self.fits):
@@ -580,6 +585,8 @@ class _Weighed:
         )
 
     def _interval(self, index: int, reading: RunReading) -> tuple[float, float] | None:
+        """COF two standard deviations below and above the mean that the other tests of the life predict for a reading;
+        None without other tests."""
         life = self._life_at(reading.cycles)
         if all(fitted_tests in ([], [index]) for _, fitted_tests in self.fits):
             return None

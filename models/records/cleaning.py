@@ -105,6 +105,7 @@ def plan_cleaning(record: Sampled) -> Cleaning:
 
 
 def _require_measurements(name: str, channel: FloatArray) -> None:
+    """Raise UnusableRecordError if a value of the channel is too large to be a measurement."""
     if max(float(channel.max()), -float(channel.min())) > criteria.LARGEST_VALUE:
         raise UnusableRecordError(
             f"{name} must lie within ±{criteria.LARGEST_VALUE:g}, got {float(channel[np.abs(channel).argmax()])}"

@@ -75,7 +75,7 @@ def hidden_in(run: SimulatedRun, clutch: SimulatedClutch, sizes: Mapping[str, fl
         measured = run.record if run.record is not None else run.plateaus
         if measured is None:
             continue
-        changed = _changed(effect, size, measured, clutch, run)
+        changed = _with_effect(effect, size, measured, clutch, run)
         run = replace(run, record=changed) if isinstance(changed, Record) else replace(run, plateaus=changed)
     return run
 
@@ -123,10 +123,11 @@ def _hides(meaning: str, unit: str = "", *, size: float, loops: bool = False) ->
     return listed
 
 
-def _changed(
+def _with_effect(
     effect: HiddenEffect, size: float, held: Plateaus | Record, clutch: SimulatedClutch, run: SimulatedRun
 ) -> Plateaus | Record:
-    """A test's channels with the torque of a hidden effect added."""
+    """Channels of a test with the effect's change of torque added; a stationary test is unchanged by an effect of loops
+    alone."""
     if effect.loops and isinstance(held, Plateaus):
         return held
     middles = PLATEAU_DURATION * (np.arange(held.torque.size, dtype=np.float64) + 0.5)

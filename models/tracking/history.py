@@ -60,13 +60,14 @@ class History:
         return np.array(begun, dtype=np.float64)
 
     def step_sizes(self, prior: TrackPrior) -> FloatArray:
-        """Prior standard deviations [e] of these steps, as shares of the size of the quantity."""
+        """Prior standard deviations [e] of the steps between epochs, as shares of the size of the quantity."""
         sizes = step_sizes(self.epoch, self.new_levels, prior.step_size)
         return np.where(self.reading_steps, LEVEL_SIZE, sizes)
 
     @property
     def reading_steps(self) -> NDArray[np.bool_]:
-        """Whether each of these steps [e] is a sensor's alone: it was zeroed, and no other event lies there."""
+        """Whether only a zeroed sensor explains the step at the beginning of each epoch after the first [e]: it was
+        zeroed there, and no other event lies there."""
         first = np.unique(self.epoch, return_index=True)[1]
         epochs, levels, zeroed = (np.diff(each[first]) for each in (self.epoch, self.new_levels, self.sensor))
         return np.asarray((zeroed > 0) & (epochs <= zeroed + levels))

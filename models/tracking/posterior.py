@@ -106,6 +106,8 @@ class TrackPosterior:
         return np.asarray(level - discrepancy.steepening * (worn / knee) * np.maximum(zeta - knee, 0.0))
 
     def _without_knee(self, progress: FloatArray) -> FloatArray:
+        """ξ [k, n] of every draw at progress [k] or [k, n] as if it had no knee: eq. 6's course with δ, which beyond
+        the measured span goes on with the course's own progress."""
         zeta = progress if progress.ndim == 2 else progress[:, None]
         share = self._share(zeta)
         law = self.initial + self.change * share

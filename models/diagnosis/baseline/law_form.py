@@ -81,7 +81,7 @@ class LawForm:
     def shares(self, velocity: FloatArray, pressure: FloatArray, cycles: FloatArray) -> FloatArray:
         """∂δ/∂coefficient [n, k] at velocity [n] m/s, pressure [n] Pa and cycles [n]."""
         moved, high, gone = self._places(Same(pressure), Same(cycles))
-        form = self._form(self._speed(velocity, moved))
+        form = self._form(self._speed_position(velocity, moved))
         over_pressure = _waves(high, self._of_pressure, _LAW_LENGTH)[:, 1:]
         over_life = _waves(gone, self._of_life, _LAW_LENGTH)[:, 1:]
         changing = form[:, : _CHANGING + 1]
@@ -101,7 +101,7 @@ class LawForm:
         self, coefficients: bytes, velocity: Same[FloatArray], pressure: Same[FloatArray], cycles: Same[FloatArray]
     ) -> FloatArray:
         moved, alone, factors = self._beside_speed(coefficients, pressure, cycles)
-        over_speed = _between(self._tables(coefficients)[0], self._speed(velocity.value, moved))
+        over_speed = _between(self._tables(coefficients)[0], self._speed_position(velocity.value, moved))
         return np.asarray(alone + np.einsum("nk,nk->n", over_speed, factors), dtype=np.float64)
 
     @lru_cache(maxsize=8)  # noqa: B019 - as below
@@ -129,8 +129,9 @@ class LawForm:
         gone = np.sqrt(np.clip((cycles.value - self.first) / max(self.last - self.first, 1.0), 0.0, 1.0))
         return np.exp(-_at(high, self.moved_by_pressure) - _at(gone, self.moved_by_life)), high, gone
 
-    def _speed(self, velocity: FloatArray, moved: FloatArray) -> FloatArray:
-        """Positions [n] within 0 ... 1 along ln v."""
+    def _speed_position(self, velocity: FloatArray, moved: FloatArray) -> FloatArray:
+        """Positions [n] of velocities [n] m/s along ln v: 0 at the slowest, 1 at the fastest that was measured, after
+        scaling by `moved` [n], with which the form follows V_S."""
         return np.log(np.clip(velocity * moved, self.slowest, self.fastest) / self.slowest) / self._width
 
     def _form(self, speed: FloatArray) -> FloatArray:

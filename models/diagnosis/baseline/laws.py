@@ -81,20 +81,21 @@ class Laws:
         """Stribeck parameters M_s, M̄_c, V_S, C_v [n, 4] at pressure [n] Pa and cycles [n]. V_S is kept above 0, the
         others are as fitted; `below` as in `falling_weight`."""
         begins, repeats = _stretches(pressure, cycles)
-        return np.repeat(self._values(pressure[begins], cycles[begins], None, below)[0], repeats, axis=0)
+        return np.repeat(self._evaluated(pressure[begins], cycles[begins], None, below)[0], repeats, axis=0)
 
     def with_gradient(self, pressure: FloatArray, cycles: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Parameters [n, 4], their derivatives by θ's blocks [n, 4, BLOCK], and those of M̄_c by FALL [n, 2]."""
         begins, repeats = _stretches(pressure, cycles)
         slopes = np.empty((begins.size, 4, BLOCK))
-        values, by_fall = self._values(pressure[begins], cycles[begins], slopes)
+        values, by_fall = self._evaluated(pressure[begins], cycles[begins], slopes)
         values, slopes, by_fall = (np.repeat(rows, repeats, axis=0) for rows in (values, slopes, by_fall))
         return values, slopes, by_fall
 
-    def _values(
+    def _evaluated(
         self, pressure: FloatArray, cycles: FloatArray, slopes: FloatArray | None, below: float = 0.0
     ) -> tuple[FloatArray, FloatArray]:
-        """Parameters [n, 4] and M̄_c's derivatives by FALL [n, 2]; fills `slopes` [n, 4, BLOCK] where it is given."""
+        """Stribeck parameters [n, 4] at pressure [n] Pa and cycles [n], and M̄_c's derivatives by FALL [n, 2]. An array
+        `slopes` [n, 4, BLOCK] is filled with the derivatives of each parameter by its block of θ."""
         values = np.empty((pressure.size, 4))
         by_fall = np.zeros((pressure.size, 2))
         high = (pressure - self.frame.lowest) / self.frame.span

@@ -125,37 +125,45 @@ def binned_loops(record: Record, geometry: Geometry) -> tuple[list[BinnedLoop], 
 
 
 def _speed_cycle(time: FloatArray, velocity: FloatArray, before: Cycle | None) -> Cycle | str:
-    """The speed cycle of the stretch, with the frequency of the stretch before where that fits here too, else fitted
-    again."""
+    """The speed cycle of a stretch of one pressure, or the reason why there is none: with the frequency of the stretch
+    before where that fits here too, else fitted again."""
     count = SPEED_HARMONICS if before is None else before.cosine.size
     step = 1 if count > SPEED_HARMONICS else max(1, time.size // 400)  # corners need every sample
     t, v = time[::step], velocity[::step]
     if before is not None and t.size > 4 * count:
-        origin = 0.5 * float(t[0] + t[-1])
-        basis = harmonics(2 * math.pi * before.frequency * (t - origin), count)
-        columns = np.column_stack([np.ones_like(t), basis])
-        coefficients = np.linalg.lstsq(columns, v, rcond=None)[0]
-        noise = float(np.sqrt(((v - columns @ coefficients) ** 2).mean()))
         duration = float(time[-1] - time[0]) + float(time[-1] - time[0]) / max(time.size - 1, 1)
-        periods = math.floor(duration * before.frequency + 0.01)
-        # the same cycle serves this pressure
-        if periods >= 1 and noise <= 1.3 * before.noise + 1e-3 * before.amplitude:
-            stop = float(time[0]) + duration
-            return replace(
-                before,
-                origin=origin,
-                mean=float(coefficients[0]),
-                cosine=np.asarray(coefficients[1 : count + 1], dtype=np.float64),
-                sine=np.asarray(coefficients[count + 1 :], dtype=np.float64),
-                periods=periods,
-                begin=float(t[0]),
-                start=stop - periods / before.frequency,
-                stop=stop,
-            )
+        same = _same_frequency(t, v, duration, before)
+        if same is not None:
+            return same
     cycle = fit_cycle(t, v)
     if step > 1 and not isinstance(cycle, str) and cycle.cosine.size > SPEED_HARMONICS:
         return fit_cycle(time, velocity)  # corners need every sample
     return cycle
+
+
+def _same_frequency(time: FloatArray, velocity: FloatArray, duration: float, before: Cycle) -> Cycle | None:
+    """The cycle of velocity [n] m/s at time [n] s at the frequency of the cycle `before`; None where the stretch of that
+    duration [s] holds no period of it, or the error is larger than it was there."""
+    count, origin = before.cosine.size, 0.5 * float(time[0] + time[-1])
+    basis = harmonics(2 * math.pi * before.frequency * (time - origin), count)
+    columns = np.column_stack([np.ones_like(time), basis])
+    coefficients = np.linalg.lstsq(columns, velocity, rcond=None)[0]
+    noise = float(np.sqrt(((velocity - columns @ coefficients) ** 2).mean()))
+    periods = math.floor(duration * before.frequency + 0.01)
+    if periods < 1 or noise > 1.3 * before.noise + 1e-3 * before.amplitude:
+        return None
+    stop = float(time[0]) + duration
+    return replace(
+        before,
+        origin=origin,
+        mean=float(coefficients[0]),
+        cosine=np.asarray(coefficients[1 : count + 1], dtype=np.float64),
+        sine=np.asarray(coefficients[count + 1 :], dtype=np.float64),
+        periods=periods,
+        begin=float(time[0]),
+        start=stop - periods / before.frequency,
+        stop=stop,
+    )
 
 
 def _effective_velocity(cycle: Cycle, time: FloatArray, velocity: FloatArray, slowest: float) -> FloatArray:

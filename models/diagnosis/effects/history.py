@@ -38,6 +38,8 @@ def _carried(scene: Scene, part: float) -> FloatArray:
 
 
 def _running_in_grid(facts: Facts) -> tuple[Tried, ...]:
+    """Shapes (ln of the decay's length [cycles], part of the torque) of running-in: five lengths, of static torque or
+    of all; none with fewer than four states."""
     if facts.states.size < 4:
         return ()
     gap = max(float(np.diff(facts.states).min()), 1e-3 * facts.life)
@@ -46,6 +48,7 @@ def _running_in_grid(facts: Facts) -> tuple[Tried, ...]:
 
 
 def _running_in_change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
+    """Change of torque [P] Nm that decays with the cycles since the life began: a · part · e^(-ζ/length)."""
     log_length, part = shape
     left = np.exp(-scene.points.cycles / np.exp(log_length))
     return np.asarray(amplitude * _carried(scene, part) * left, dtype=np.float64)
@@ -86,6 +89,8 @@ _THICKEST = 4.0
 
 
 def _oil_change_grid(facts: Facts) -> tuple[Tried, ...]:
+    """Shapes (onset [cycles], share of boundary friction, share lost with age) of an oil change at each possible
+    onset; one in the log is more probable than one that nobody logged."""
     tried = []
     for low, onset, high in facts.onsets:
         logged = any(low <= cycles <= high for cycles in facts.oil_changes)
@@ -95,6 +100,8 @@ def _oil_change_grid(facts: Facts) -> tuple[Tried, ...]:
 
 
 def _oil_change_change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
+    """Change of torque [P] Nm after the onset: a step of viscous friction with a share of boundary friction, which
+    ages."""
     onset, share, lost = shape
     since = scene.points.cycles - onset
     ageing = 1.0 - lost * -np.expm1(-np.maximum(since, 0.0) / (0.5 * scene.facts.life))
@@ -144,6 +151,8 @@ def _faster(scene: Scene, lost: float, onset: float) -> FloatArray:
 
 
 def _accelerated_wear_grid(facts: Facts) -> tuple[Tried, ...]:
+    """Shapes (onset [cycles], power, part) of accelerated wear at each onset but the first; none with fewer than four
+    states."""
     if facts.states.size < 4:
         return ()
     onsets = sorted({cycles for low, onset, _ in facts.onsets[1:] for cycles in (low, onset)})
@@ -153,6 +162,8 @@ def _accelerated_wear_grid(facts: Facts) -> tuple[Tried, ...]:
 
 
 def _accelerated_wear_change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
+    """Change of torque [P] Nm after the onset: static torque lost with a power of the cycles since, or eq. 6 at a
+    faster pace."""
     onset, power, part = shape
     late = np.maximum(scene.points.cycles - onset, 0.0) / max(float(scene.facts.states[-1]) - onset, 1.0)
     if part == PACE:
@@ -189,6 +200,7 @@ ACCELERATED_WEAR = Effect(
 
 
 def _load_severity_grid(facts: Facts) -> tuple[Tried, ...]:
+    """One shape (it has no parameters) if the blocks of duty differ in energy; none otherwise."""
     # blocks that differ by less than 3 % cannot show a severity
     if facts.duty_energies.size > 1 and np.ptp(np.log(facts.duty_energies)) > 0.03:
         return (Tried(shape=()),)
@@ -234,6 +246,8 @@ LOAD_SEVERITY = Effect(
 
 
 def _rest_recovery_grid(facts: Facts) -> tuple[Tried, ...]:
+    """Shapes (length [cycles], by use or by the clock, ln of the settling time [s], power of the pause, part) of
+    recovery after rests; none without a rest."""
     if not facts.rests or facts.states.size < 2:
         return ()
     gap = float(np.median(np.diff(facts.states)))
@@ -247,6 +261,8 @@ def _rest_recovery_grid(facts: Facts) -> tuple[Tried, ...]:
 
 
 def _rest_recovery_change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
+    """Change of torque [P] Nm that a rest leaves: largest just after it, less with the cycles and the time since; of
+    several rests the largest counts."""
     length, clocked, settling, power, part = shape
     points, seconds = scene.points, math.exp(settling)
     share = np.zeros_like(points.cycles)

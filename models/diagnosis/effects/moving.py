@@ -64,6 +64,8 @@ _SWING = 24
 
 
 def _squeeze_film_grid(_facts: Facts) -> tuple[Tried, ...]:
+    """Shapes tried for the squeeze film, of three forms: first order, film and thickness. All shapes of a form are
+    equally probable."""
     forms = (  # powers of pressure and speed, least film, shear or time, form, lag; eq. 7 ties strength and time together
         ([(0.0, 0.6), (0.5, 1.0, 1.5), (0.02, 0.06, 0.15), (0.5,), (FIRST_ORDER,), (0.0,)], 0.0),
         ([(0.4,), (0.4, 0.8, 1.2), (0.05, 0.2), (0.2, 0.7), (FILM,), (0.0, 1.0)], 0.0),
@@ -77,6 +79,8 @@ def _squeeze_film_grid(_facts: Facts) -> tuple[Tried, ...]:
 
 
 def _squeeze_film_changes(scene: Scene, settings: Sequence[tuple[float, Shape]]) -> FloatArray:
+    """Changes of torque [P, s] Nm by the squeeze film at s settings (amplitude, shape), each by its form; the film
+    form is computed for all its settings at once."""
     points = scene.points
     speed = points.velocity / scene.laws.frame.reference_velocity
     out = np.zeros((speed.size, len(settings)))

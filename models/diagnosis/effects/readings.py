@@ -43,6 +43,8 @@ STRAIGHT = (0.0,) * (KNOTS.size - 2)
 
 
 def _torque_zero_shift_grid(facts: Facts) -> tuple[Tried, ...]:
+    """Shapes (course, value, deviations from the course) of a shifted zero for the search: constant, with the test's
+    clock, settling, a step at each possible onset, creeping over cycles or days."""
     zeroed = facts.sensor_zeros
     tried = [Tried(shape=(STEP, -1.0, *STRAIGHT), log_weight=-1.0), Tried(shape=(CLOCK, 0.0, *STRAIGHT))]
     weight = -float(np.log(len(TIMES)))
@@ -59,6 +61,8 @@ def _torque_zero_shift_grid(facts: Facts) -> tuple[Tried, ...]:
 
 
 def _torque_zero_shift_courses(facts: Facts) -> tuple[Tried, ...]:
+    """Shapes of the search with finer ones over life, under which a size is estimated: even and flattening courses
+    over cycles, and over days if the tests were timed."""
     tried = list(_torque_zero_shift_grid(facts))
     if facts.states.size > 2:
         timed = facts.first_moment is not None
@@ -70,6 +74,8 @@ def _torque_zero_shift_courses(facts: Facts) -> tuple[Tried, ...]:
 
 
 def _torque_zero_shift_change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
+    """Change of torque [P] Nm, a · direction · course: a shifted zero keeps its sign when the clutch turns the other
+    way."""
     course, value, *off = shape
     clock, cycles = scene.points.clock, scene.points.cycles
     if course == STEP:
@@ -162,6 +168,8 @@ def _offsets(facts: Facts, growing: Sequence[Shape]) -> tuple[Tried, ...]:
 
 
 def _pressure_offset_changes(scene: Scene, settings: Sequence[tuple[float, Shape]]) -> FloatArray:
+    """Changes of torque [P, s] Nm by offsets of the pressure at s settings (amplitude, shape): the curve at the offset
+    pressure less that at the pressure read."""
     as_read = scene.curve_with(pressure=scene.points.pressure)  # by the same law below the lowest level
     changes = np.empty((as_read.size, len(settings)))
     for place, (amplitude, shape) in enumerate(settings):
@@ -222,6 +230,8 @@ TORQUE, TORQUE_WITHIN, SPEED = map(float, range(3))
 
 
 def _unsettled_dwell_change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
+    """Change of torque [P] Nm of plateaus that still carry a share of the plateau before: of its difference in speed,
+    or in settled torque."""
     start, carried = shape
     points = scene.points
     previous = points.previous
@@ -272,6 +282,8 @@ UNSETTLED_DWELL = Effect(
 
 
 def _channel_delay_change(scene: Scene, amplitude: float, _shape: Shape) -> FloatArray:
+    """Change of torque [P] Nm by a delay of `amplitude` [s]: each loop's curve shifted along its phase; 0 at
+    plateaus."""
     points = scene.points
     out = np.zeros_like(scene.curve)
     looping = np.flatnonzero(points.loop >= 0)

@@ -87,6 +87,8 @@ def _film(log_viscosity: Same[FloatArray], points: Same[Points], settling: float
 
 
 def _oil_temperature_change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
+    """Change of torque [P] Nm with the measured oil temperature: viscous friction by viscosity to the power of the
+    amplitude, and a shift of the Stribeck velocity by a share of it."""
     measured = log_viscosity_ratio(scene.points.temperature, scene.facts.reference_temperature, scene.facts.oil)
     logs = _film(Same(measured), Same(scene.points), math.exp(shape[1]))
     exponent = np.clip(amplitude * logs, -5.0, 5.0)
@@ -141,6 +143,8 @@ _MOST_WARMTH = 30.0
 
 
 def _interface_heating_grid(facts: Facts) -> tuple[Tried, ...]:
+    """Shapes (ln of the settling time [s], part of the torque, saturation) of heating at the interface; where the
+    plate's temperature was measured, the part alone."""
     if facts.plate_in_all_tests:  # settling and saturation are in what was measured
         return tuple(Tried(shape=(0.0, part, 0.0)) for part in (WHOLE, VISCOUS, WHOLE_AT_ONCE, VISCOUS_AT_ONCE))
     return tuple(
@@ -152,6 +156,8 @@ def _interface_heating_grid(facts: Facts) -> tuple[Tried, ...]:
 
 
 def _interface_heating_change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
+    """Change of torque [P] Nm by the lining's warming: the part S ((1 - a)^warmth - 1), S all of the curve or its
+    viscous friction."""
     log_settling, part, saturation = shape
     warmth = _measured(scene, _computed(scene, float(np.exp(log_settling)), saturation))
     carried = scene.curve if part in {WHOLE, WHOLE_AT_ONCE} else scene.viscous
@@ -213,6 +219,7 @@ INTERFACE_HEATING = Effect(
 
 
 def _viscous_exponent_change(scene: Scene, amplitude: float, _shape: Shape) -> FloatArray:
+    """Change of torque [P] Nm by another exponent of viscous friction: C_v v^γ ((v/v_0)^a - 1)."""
     middle = scene.laws.frame.reference_velocity
     exponent = np.clip(amplitude, -0.6, 1.5) * np.log(scene.points.velocity / middle)
     return np.asarray(scene.viscous * np.expm1(exponent), dtype=np.float64)
@@ -240,6 +247,8 @@ VISCOUS_EXPONENT = Effect(
 
 
 def _hydrodynamic_drag_grid(facts: Facts) -> tuple[Tried, ...]:
+    """Shapes (power of speed, rupture, power of viscosity, lag) of drag in the grooves; Newton's, without rupture and
+    proportional to viscosity, is the most probable."""
     thinning = (0.0, 1.0) if facts.temperature_measured else (0.0,)
     courses = ((0.6, 0.0), (1.0, 0.0), (1.5, 0.0), (1.0, 0.5), (1.0, 2.0))
     return tuple(
@@ -252,6 +261,8 @@ def _hydrodynamic_drag_grid(facts: Facts) -> tuple[Tried, ...]:
 
 
 def _hydrodynamic_drag_change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
+    """Change of torque [P] Nm, a x^n (1 + r)/(1 + r x²) with x = v/v_0, times viscosity to a power; none at an open
+    clutch."""
     power, rupture, thinning, _ = shape
     logs = log_viscosity_ratio(scene.points.temperature, scene.facts.reference_temperature, scene.facts.oil)
     relative = scene.points.velocity / scene.laws.frame.reference_velocity

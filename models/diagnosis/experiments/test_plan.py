@@ -84,7 +84,7 @@ def advise(
     before = distances.with_freedom(())
     ranked = []
     for key, rows in trials_of(campaign, problem.design, distances).items():
-        chance, other, nats = _brought(before, distances.with_freedom(rows), evidences, len(race))
+        chance, other, nats = _outcome_of_trial(before, distances.with_freedom(rows), evidences, len(race))
         narrows = distances.size_left(rows) if len(race) == 1 else 0.0
         # less than "positive" (Kass and Raftery, J. Am. Stat. Assoc. 90 (1995) 773) is no advice
         if np.isfinite(chance) and nats >= 1.0 and narrows <= criteria.MAX_LEFT:
@@ -114,12 +114,15 @@ def advise(
     return (*first, *worthy)[:3]
 
 
-def _brought(
+def _outcome_of_trial(
     before: tuple[FloatArray, FloatArray], after: tuple[FloatArray, FloatArray], evidences: FloatArray, racing: int
 ) -> tuple[float, int, float]:
-    """Three results of a trial, from distances and freedoms before and after it: the probability that one candidate is
-    left (NaN where it cannot be computed), the index of the best candidate's rival that stays hardest to distinguish,
-    and the evidence [nats] between them that the trial brings."""
+    """Expected outcome of a trial: the probability that it leaves one candidate (NaN where it cannot be computed), the
+    index of the rival that stays hardest to distinguish from the best candidate, and the evidence [nats] between these
+    two that the trial adds.
+
+    `before` and `after` the trial: the distances λ_ab [k, k + 1] and freedoms [k + 1] of the k candidates and of no
+    effect (`CandidateDistances.with_freedom`). The first `racing` candidates are credible."""
     count = evidences.size
     gained, change = np.maximum(after[0] - before[0], 0.0), after[1] - before[1]
     freedom = change[:count] - change[-1]

@@ -270,6 +270,8 @@ class Search:
         return value + float(np.logaddexp(done, log_sum(left))) - done
 
     def _up(self) -> None:
+        """Refit the most promising alternatives, from the best refitted one upwards, until none is promised to matter
+        or MOST_REFITS is reached; alternatives near the best one are screened first."""
         most = self.refits + criteria.MOST_REFITS
         while self._promises and self.refits < most:
             weights = self.weights()

@@ -80,7 +80,7 @@ def highest_line(problem: FitProblem, residual: FloatArray) -> float:
     """The p-value of the highest spectral line in a residual [N] Nm, power summed over the runs, corrected for all the
     frequencies searched. The likely gains of curves are to be taken out before: at one pressure after the other they
     are steps at even times."""
-    runs = _runs(problem.design, problem.noise, residual)
+    runs = _plateau_series(problem.design, problem.noise, residual)
     longest = max((run.time.size for run in runs), default=0)
     if sum(run.time.size for run in runs) < 64 or longest < _FEWEST_IN_A_RUN:
         return 1.0
@@ -103,7 +103,8 @@ def highest_line(problem: FitProblem, residual: FloatArray) -> float:
     return min(1.0, tests * float(gammaincc(len(kept), power.max())))
 
 
-def _runs(design: Design, noise: Noise, residual: FloatArray) -> list[_Run]:
+def _plateau_series(design: Design, noise: Noise, residual: FloatArray) -> list[_Run]:
+    """The plateaus of each stationary run as a time series of the whitened residual [N] Nm, without the run's gain."""
     steady = slice(0, design.plateaus)
     white = whitened(np.column_stack([residual, design.torque]), design, noise)[steady]
     runs = []

@@ -215,7 +215,8 @@ def _kinds_of_courses(fitted: FittedEffect, facts: Facts) -> list[list[Tried]]:
 
 
 def _refit_under(problem: FitProblem, near: PooledFit, place: int, shape: Shape) -> PooledFit:
-    """The fit from `near` with the effect at that place in this shape, in which the shapes that are held stay."""
+    """Refit that starts at the fit `near`, with the effect at that place in this shape; shapes that a course holds are
+    not fitted."""
     effects, fitted = near.effects, near.effects[place]
     shapes = tuple(replace(one, smooth=one.smooth and not one.held) for one in fitted.effect.shapes)
     tried = replace(fitted, effect=replace(fitted.effect, shapes=shapes), shape=shape)

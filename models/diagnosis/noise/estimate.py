@@ -72,13 +72,19 @@ def pieces_across_curves(design: Design, part: NDArray[np.bool_]) -> list[Residu
     ):
         same = np.unique(np.stack([speed, fixed], axis=1), axis=0, return_inverse=True)[1]
         ordered = indices[np.argsort(across[indices], kind="stable")]
-        pieces = pieces if _free(pieces) >= criteria.FEWEST else _pieces(design, ordered, same, _LONGEST, degree)
+        pieces = (
+            pieces
+            if _degrees_of_freedom(pieces) >= criteria.FEWEST
+            else _pieces(design, ordered, same, _LONGEST, degree)
+        )
     return pieces
 
 
 def _pieces(
     design: Design, indices: IntArray, owner: IntArray, longest: int, degree: int = criteria.SMOOTH_DEGREE
 ) -> list[ResidualPiece]:
+    """Residual pieces of at most `longest` consecutive rows of one owner, among the rows `indices`, with contrasts to
+    a smooth course: a polynomial of the degree for plateaus, harmonics of the phase for loops."""
     pieces = []
     order = indices[np.argsort(owner[indices], kind="stable")]
     edges = np.flatnonzero(np.diff(owner[order])) + 1
@@ -198,17 +204,17 @@ def first_noise(design: Design) -> Noise:
 
 
 def estimate_noise(design: Design, residual: FloatArray, torque: FloatArray, before: Noise) -> tuple[Noise, bool]:
-    """The noise in residual [N] Nm about torque [N] Nm, and whether it was assumed, for plateaus or for loops, because
-    there are too few rows to estimate it."""
+    """Noise (deviation of each row, autocorrelation of plateaus and of loops) estimated from a residual [N] Nm about
+    torque [N] Nm, and whether part of it was assumed as `before`, because plateaus or loops are too few."""
     deviation, residual = before.deviation.copy(), unlike(design, residual, torque)
     correlations, assumed = [], False
     steady = np.arange(residual.size) < design.plateaus
     for part in (steady, ~steady):
         pieces = calm_pieces(design, part, residual)
-        along_curves = _free(pieces) >= criteria.FEWEST
+        along_curves = _degrees_of_freedom(pieces) >= criteria.FEWEST
         if not along_curves and part[0]:
             pieces = pieces_across_curves(design, part)
-        if _free(pieces) < criteria.FEWEST:
+        if _degrees_of_freedom(pieces) < criteria.FEWEST:
             assumed = assumed or bool(part.any())
             correlations.append(Correlation())
             continue
@@ -227,10 +233,15 @@ def estimate_noise(design: Design, residual: FloatArray, torque: FloatArray, bef
         correlation, scale = estimate_correlation(pieces, residual, np.sqrt(variance), from_samples, differences)
         deviation[part] *= scale
         correlations.append(correlation)
-    spiky = (np.abs(residual) > criteria.SPIKE * deviation) & _isolated(design, residual, deviation)
-    if spiky.mean() < 0.02:  # fewer are spikes
-        deviation = np.where(spiky, np.abs(residual), deviation)
+    deviation = _widened_at_spikes(design, residual, deviation)
     return replace(before, deviation=deviation, plateaus=correlations[0], loops=correlations[1]), assumed
+
+
+def _widened_at_spikes(design: Design, residual: FloatArray, deviation: FloatArray) -> FloatArray:
+    """Deviations [N] Nm, at isolated spikes as large as the residual [N] itself; unchanged where 2 % of the rows or more
+    look like spikes, for then they are noise."""
+    spiky = (np.abs(residual) > criteria.SPIKE * deviation) & _isolated(design, residual, deviation)
+    return np.where(spiky, np.abs(residual), deviation) if spiky.mean() < 0.02 else deviation
 
 
 def unlike(design: Design, residual: FloatArray, torque: FloatArray) -> FloatArray:
@@ -254,7 +265,8 @@ def unlike(design: Design, residual: FloatArray, torque: FloatArray) -> FloatArr
     return out
 
 
-def _free(pieces: Sequence[ResidualPiece]) -> int:
+def _degrees_of_freedom(pieces: Sequence[ResidualPiece]) -> int:
+    """Degrees of freedom that are left for the noise: the number of contrasts of all pieces."""
     return sum(piece.contrasts.shape[1] for piece in pieces)
 
 

@@ -285,6 +285,8 @@ def _best_of(problem: FitProblem, starts: Sequence[Laws], steps: int) -> PooledF
 
 
 def _notes(design: Design, assumed: bool) -> tuple[str, ...]:
+    """Sentences on what the design lacks (rows left out, noise that is assumed, speeds, oil temperature), for the
+    report."""
     notes = list(design.notes)
     if assumed:
         notes.append("Too few plateaus to estimate the noise: 1 % of the torque is assumed.")

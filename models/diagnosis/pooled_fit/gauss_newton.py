@@ -126,6 +126,8 @@ def _inside(state: PooledFit, priors: Priors, matrix: FloatArray, gradient: Floa
 
 
 def _evaluated(problem: FitProblem, metric: Products, laws: Laws, effects: tuple[FittedEffect, ...]) -> PooledFit:
+    """The fit at these parameters without a step: torque, residual and cost [nats], which is infinite where they
+    overflow."""
     design, priors = problem.design, problem.priors
     with np.errstate(over="ignore", invalid="ignore"):  # a step too far: its cost is infinite, and it is not taken
         prediction = predict(design, laws)

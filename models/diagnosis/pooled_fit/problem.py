@@ -58,6 +58,8 @@ def priors_of(design: Design, start: FloatArray, frame: Frame) -> Priors:
 
 
 def _free(design: Design, size: int) -> NDArray[np.bool_]:
+    """Mask [size] of the parameters θ that the campaign's states, pressures and loops can determine; the others stay
+    at their priors."""
     closed = design.closed
     states, levels = np.unique(design.rows.cycles[closed]).size, design.levels.size
     loop_states = np.unique(design.rows.cycles[design.plateaus :][closed[design.plateaus :]]).size

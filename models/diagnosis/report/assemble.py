@@ -86,6 +86,7 @@ def _onset(fitted: FittedEffect) -> str:
 
 
 def _estimate(slug: str, amplitude: float, deviation: float) -> AmplitudeEstimate:
+    """An effect's amplitude with its standard deviation, converted from SI to the unit of the report."""
     effect = BY_SLUG[slug]
     return AmplitudeEstimate(
         name=effect.amplitude,

@@ -205,6 +205,7 @@ def _words(sentences: Sequence[Sentence]) -> int:
 
 
 def _adequate(report: Report) -> list[Sentence]:
+    """Sentences for a model that is adequate: its probability, what is not excluded, what to do next."""
     noise = "" if report.baseline is None else f" of {number(report.baseline.noise)} Nm"
     nothing = next((item.probability for item in report.explanations if not item.effects), 1.0)
     sentences = [
@@ -278,6 +279,7 @@ def _scatter(scatter: RunScatter | None) -> str:
 
 
 def _named(report: Report) -> list[Sentence]:
+    """Sentences for a named cause: its probability, physics and size, what else may be at work, what to check."""
     causes = set(report.causes)
     names = " together with ".join(_with_article(slug) for slug in report.causes)
     share = sum(item.probability for item in report.explanations if causes <= set(item.effects))
@@ -404,6 +406,8 @@ def _cause_name(slug: str) -> str:
 
 
 def _unexplained(report: Report) -> list[Sentence]:
+    """Sentences for a model that is wrong without a known cause: what it resembles, where the error lies, where to
+    look."""
     unknown = sum(item.probability for item in report.explanations if UNCATALOGUED in item.effects)
     resembles = f" It looks most like {report.resembles}." if report.resembles else ""
     first = f"The model is wrong in a way that no known cause explains (probability {probability(unknown)}).{resembles}"

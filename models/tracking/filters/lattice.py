@@ -172,8 +172,10 @@ def log_density(
     blur: FloatArray | float = 0.0,
     of: NDArray[np.intp] | None = None,
 ) -> FloatArray:
-    """Log posterior density up to a constant, [k, levels, rows, nodes]; a frame of one kind serves all. `of` [k]: which of
-    the tables is that of each kind, where those of one also share the variance of every measurement."""
+    """Log posterior density [k, levels, rows, nodes], up to a constant, of each kind at the lattice's values of scatter,
+    exponent and scale. A frame of one kind serves all.
+
+    `of` [k]: the index of each kind's table; kinds with one table share the variance of every measurement."""
     count, rows = kinds.form.size, frame.log_exponent.shape[1]
     levels = np.broadcast_to(frame.log_scatter, (count, frame.log_scatter.shape[1]))
     sums = tabulated(history, prior, table, levels, kinds.form, kinds.outlying.T, blur, of)

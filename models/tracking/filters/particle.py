@@ -253,7 +253,7 @@ class Particle:
         """The particles resampled, then moved by a Metropolis random walk shaped like the cloud."""
         weight, span = normalised(cloud.log_weight), history.span
         shapes = _shapes(cloud, weight, span)
-        chance, log_weight = _kept(cloud.course, weight)
+        chance, log_weight = _with_least_share(cloud.course, weight)
         index = systematic(chance, weight.size, float(rng.random()))
         cloud = replace(cloud.taken(index), log_weight=log_weight[index])
         moved, reach = np.zeros(weight.size, dtype=bool), 1.0
@@ -299,7 +299,9 @@ def _shapes(cloud: Cloud, weight: FloatArray, span: float) -> FloatArray:
     return shapes
 
 
-def _kept(course: NDArray[np.intp], weight: FloatArray, least: float = 0.05) -> tuple[FloatArray, FloatArray]:
+def _with_least_share(
+    course: NDArray[np.intp], weight: FloatArray, least: float = 0.05
+) -> tuple[FloatArray, FloatArray]:
     """Resampling weights [n] under which every course keeps at least the share `least`, and the compensating log
     weights [n]: a course that the data do not favour today they may favour later."""
     share = np.bincount(course, weights=weight, minlength=len(CourseForm))

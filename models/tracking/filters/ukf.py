@@ -274,8 +274,9 @@ def coefficients(
     return coefficients_at(log_scale, log_exponent, course)
 
 
-def _units(prior: TrackPrior, dimension: int) -> tuple[FloatArray, FloatArray]:
-    """Centres and units of (ξ0, ξ at the reference, log τ, log ε, δ, T δ', log s, steps)."""
+def _centre_and_unit(prior: TrackPrior, dimension: int) -> tuple[FloatArray, FloatArray]:
+    """Centre [n] and unit [n] by which the state (ξ0, ξ at the reference, log τ, log ε, δ, T δ', log s, steps) is stored
+    as a number of order one."""
     level, rate = prior.initial_mean, prior.log_scale_mean - prior.log_exponent_mean
     centre, unit = np.zeros(dimension), np.full(dimension, prior.initial_sd)
     centre[:4] = level, level, rate, prior.log_exponent_mean
@@ -286,7 +287,7 @@ def _units(prior: TrackPrior, dimension: int) -> tuple[FloatArray, FloatArray]:
 
 def scaled(prior: TrackPrior, points: FloatArray) -> FloatArray:
     """Rows of (ξ0, ξ at the reference, place, log ε, δ, T δ', log s, steps) as states [n, d]."""
-    centre, unit = _units(prior, points.shape[1])
+    centre, unit = _centre_and_unit(prior, points.shape[1])
     rows = points.copy()
     rows[:, 2] -= rows[:, 3]
     return np.asarray((rows - centre) / unit)
@@ -294,7 +295,7 @@ def scaled(prior: TrackPrior, points: FloatArray) -> FloatArray:
 
 def unscaled(prior: TrackPrior, state: FloatArray) -> FloatArray:
     """The inverse of `scaled`, for states [..., d]; states far out of the domain are moved to its edge."""
-    centre, unit = _units(prior, state.shape[-1])
+    centre, unit = _centre_and_unit(prior, state.shape[-1])
     rows = centre + unit * np.clip(state, -2.0 * DOMAIN, 2.0 * DOMAIN)
     rows[..., 2] += rows[..., 3]
     return np.asarray(rows)
@@ -311,7 +312,8 @@ def definite(covariance: FloatArray, least: float = 1e-10) -> FloatArray:
 
 
 def _moments(means: FloatArray, factors: FloatArray, weight: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Mean [d] and covariance [d, d] of a mixture of normals, of means [n, d] and factors [i, k, n] (`before_last`)."""
+    """Mean [d], held within ±DOMAIN, and covariance [d, d] of a mixture of normals, of means [n, d] and factors [i, k, n]
+    (`before_last`)."""
     share = weight / weight.sum()
     mean = share @ means
     off, within = means - mean, linear(mean.size)
