@@ -233,9 +233,11 @@ def _laws(stored: Mapping[str, Any]) -> Laws:
 
 
 def _learned_to(learned: LearnedLaw) -> dict[str, Any]:
+    """The stored form of a learned discrepancy."""
     return {"form": facts_to(learned.form), "coefficients": learned.coefficients.tolist()}
 
 
 def _learned_from(stored: Mapping[str, Any]) -> LearnedLaw:
+    """A learned discrepancy from its stored form."""
     form = LawForm(**_arrays_of(LawForm, stored["form"]))
     return LearnedLaw(form=form, coefficients=np.array(stored["coefficients"], dtype=np.float64))

@@ -53,14 +53,19 @@ def capacity_of(parameters: Mapping[float, StribeckParameters]) -> Capacity:
 
 
 class LinePressure(Protocol):
-    """A course of line pressure: `contact` [s] is when the discs touch, at the pressure `plateau` [Pa]; `maximum` [Pa]."""
+    """A course of line pressure over an engagement."""
 
     @property
-    def contact(self) -> float: ...
+    def contact(self) -> float:
+        """Time [s] at which the discs touch."""
+
     @property
-    def plateau(self) -> float: ...
+    def plateau(self) -> float:
+        """Line pressure [Pa] at contact."""
+
     @property
-    def maximum(self) -> float: ...
+    def maximum(self) -> float:
+        """Highest line pressure [Pa]."""
 
     def __call__(self, time: FloatArray) -> FloatArray:
         """Line pressure [n] Pa at time [n] s."""

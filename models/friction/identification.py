@@ -133,7 +133,7 @@ def uncertainty(
     transform = _transform(problem, optimum)
     covariance, unbiased = (
         _covariance(columns, prior, shape, noise.sd, stray, transform)
-        for shape in _shapes(problem, columns, optimum, noise)
+        for shape in _relative_variances(problem, columns, optimum, noise)
     )
     deviation = np.sqrt(np.maximum(np.einsum("pii->pi", covariance), 0.0))
     ratio = transform[:, 1, 1] * optimum.coefficients[:, 0, 1]
@@ -161,14 +161,15 @@ def _covariance(
     return np.asarray((covariance + covariance.swapaxes(1, 2)) / 2)
 
 
-def _shapes(
+def _relative_variances(
     problem: ProjectionProblem, columns: FloatArray, optimum: VelocityProfile, noise: FitNoise
 ) -> tuple[FloatArray, FloatArray]:
-    """Relative variances [P, n] of the points, over `noise.sd`²: r²/(1 - h)² (HC3), and r²/(1 - h) (HC2); both 1 where
-    the deviations are given, the first wider where they were raised.
+    """Two estimates [P, n] of the points' variances, relative to `noise.sd`², from residual r and leverage h: the wider
+    r²/(1 - h)² (HC3), and the unbiased r²/(1 - h) (HC2).
 
-    A point that the fit passes through has no residual of its own: in the first its 1 - h and its variance are taken as no
-    less than some, in the second it has the variance of the others."""
+    Where deviations are given both are 1, or the wider one the square of what they were raised by. A point that the fit
+    passes through (h near 1) has no residual of its own: in the wider estimate 1 - h and the variance have a floor, in
+    the unbiased one its variance is 1."""
     fitted = (columns[:, :, :3] @ optimum.coefficients[:, 0, :, None])[..., 0]
     left = 1.0 - _leverage(columns)
     residual = np.square((problem.torque - fitted) / noise.sd[:, None])

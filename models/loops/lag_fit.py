@@ -158,6 +158,7 @@ class _Estimate:
 
     @property
     def sd(self) -> float:
+        """Standard deviation of the lag from both."""
         return math.hypot(self.noise, self.slant)
 
     def interval(self) -> tuple[float, float]:

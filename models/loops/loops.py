@@ -140,7 +140,8 @@ def _better(attractor: LagFit, film: LagFit, telling: float = 5.0) -> str | None
 
 
 def _message(status: LagStatus, outliers: int, better: str | None) -> str:
-    """A sentence or two for a person."""
+    """The result of a loop's lag fit in a sentence or two for the report: its status, a lag law that describes the loop
+    better, and how many samples were left out as outliers."""
     sentence = {
         LagStatus.DETERMINED: "The attractor is determined.",
         LagStatus.UNRESOLVED: "The lag is too small for this noise: the attractor C has only a lower bound.",

@@ -155,11 +155,13 @@ def _log_given(runs: Sequence[Run], near: Sequence[int], cause: CommonCause) -> 
 
 
 def _log_probability(runs: Sequence[Run]) -> float:
+    """Log probability of the runs: of their judgement in order of cycles, and of their pace in order of dates."""
     ordered = _ordered(runs)
     return log_probability_of(ordered) + _log_pace(_by_date(ordered))
 
 
 def _ordered(runs: Sequence[Run]) -> list[Run]:
+    """The runs by cycles, at equal cycles by date."""
     return sorted(runs, key=lambda run: (run.cycles, run.moment or 0.0))
 
 
@@ -187,6 +189,7 @@ def _excess(dated: Sequence[_Dated]) -> Iterator[tuple[int, float]]:
 
 
 def _log_pace(dated: Sequence[_Dated]) -> float:
+    """Log probability, up to a constant, of how much faster than usual cycles pass between the dates (Student's t)."""
     freedom = criteria.RATE_FREEDOM
     return -0.5 * (freedom + 1.0) * sum(math.log1p(z * z / freedom) for _, z in _excess(dated) if z > 0.0)
 

@@ -183,6 +183,7 @@ class _Clutch:
 
     @cached_property
     def all_tests(self) -> list[int]:
+        """Indices of the tests."""
         return [i for i, run in enumerate(self.runs) if run.tests]
 
     @cached_property
@@ -192,6 +193,7 @@ class _Clutch:
 
     @cached_property
     def rebuilds(self) -> list[int]:
+        """Indices of the runs that begin a life."""
         return [i for i, run in enumerate(self.runs) if run.rebuild]
 
     @cached_property
@@ -233,10 +235,12 @@ class _Clutch:
 
     @cached_property
     def rank(self) -> NDArray[np.intp]:
+        """Order [k] at equal cycles of each nearby run, by its kind."""
         return np.array([pace.rank_of(self.runs[i].kind) for i in self.near], dtype=np.intp)
 
     @cached_property
     def block(self) -> FloatArray:
+        """Cycles [k] of each nearby run that is a block of duty; NaN for other runs."""
         return np.array([math.nan if (block_of_run := self.runs[i].block) is None else block_of_run for i in self.near])
 
     @cached_property
@@ -246,6 +250,7 @@ class _Clutch:
 
     @cached_property
     def moments(self) -> FloatArray:
+        """Dates [d] s of the nearby runs that have one."""
         return np.array([self.runs[self.near[k]].moment for k in self.dated], dtype=np.float64)
 
     def surprise(self, cycles: FloatArray) -> FloatArray:
@@ -288,6 +293,7 @@ class _Weighed:
 
     @cached_property
     def _rebuilds(self) -> list[int]:
+        """Indices of the rebuilds that did not slip."""
         return [i for i in self.clutch.rebuilds if i not in self.belief.slipped]
 
     def life_of(self, index: int) -> int:
@@ -425,6 +431,7 @@ class _Weighed:
         return self._without(index, life).predict(np.maximum(cycles - self.origins[life], 0.0), epoch)
 
     def _life_at(self, cycles: float) -> int:
+        """Index of the life to which these cycles belong."""
         return max((life for life, origin in enumerate(self.origins) if origin <= cycles), default=0)
 
     def expected(self, index: int) -> float:

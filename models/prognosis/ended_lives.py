@@ -358,7 +358,12 @@ class _Decline:
         )
 
     def nodes(self, log_end: FloatArray, courses: FloatArray) -> "_Nodes":
-        """Evidence and conditional posterior moments of the tests for courses [j, e, n] at ends [e]."""
+        """Log evidence and posterior moments of the linear model
+
+            damage = (1 + a) b + features · β + δ + scatter,     a ~ N(0, COURSE_SIZE_SD²),  β ~ N(0, 1)
+
+        at each end of life [e] (`log_end`), for every course b of `courses` [j, e, n] and every pair of deviations of δ
+        and of the scatter."""
         size = np.repeat(criteria.COURSE_DISCREPANCIES, criteria.COURSE_SCATTERS.size)
         scatter = np.tile(criteria.COURSE_SCATTERS, criteria.COURSE_DISCREPANCIES.size)
         size = size * ((self.span * np.exp(-log_end)) ** 1.5)[:, None]
@@ -368,6 +373,7 @@ class _Decline:
         of_d, gram = (weight * d) @ x, np.einsum("ekn,np,nq->ekpq", weight, x, x, optimize=True)
         inverse = np.linalg.inv(np.eye(x.shape[1]) + gram)
         solved = np.einsum("ekpq,ekq->ekp", inverse, of_d)
+        # products of b and the damage d, with the features eliminated
         bb = weight @ np.square(b) - np.einsum("ekjp,ekpq,ekjq->ekj", of_b, inverse, of_b, optimize=True)
         bd = weight @ (b * d[:, None]) - np.einsum("ekjp,ekp->ekj", of_b, solved)
         dd = ((weight * d) @ d - (of_d * solved).sum(axis=2))[..., None]

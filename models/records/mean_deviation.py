@@ -176,7 +176,9 @@ def deviations(stretches: Sequence[Stretch]) -> MeanDeviations:
         slopes.append(slope)
         squares.append(square)
     correlation = pooled_correlation(residuals, removed=2)
-    variance, factor, ratio, freedom = np.array([_moments(residual, correlation) for residual in residuals]).T
+    variance, factor, ratio, freedom = np.array(
+        [_residual_statistics(residual, correlation) for residual in residuals]
+    ).T
     count = np.array([residual.size for residual in residuals])
     if not correlation.resolved and variance.any():  # few independent values hardly determine a variance
         independent = np.maximum(count / factor - 2, 1.0)
@@ -191,9 +193,10 @@ def deviations(stretches: Sequence[Stretch]) -> MeanDeviations:
     )
 
 
-def _moments(residual: FloatArray, correlation: DwellAutocorrelation) -> tuple[float, float, float, float]:
-    """Variance of an average, the variance inflation of its mean, the ratio of the batch means' variance to that
-    expected by the inflation, and its degrees of freedom."""
+def _residual_statistics(residual: FloatArray, correlation: DwellAutocorrelation) -> tuple[float, float, float, float]:
+    """Four statistics of a dwell's residual [n]: its variance; the variance inflation of its mean by the autocorrelation;
+    the variance of means over batches, as a multiple of that expected by this inflation; and the degrees of freedom of
+    this ratio (1 and 1 where there are fewer than four batches)."""
     size = residual.size
     factor = correlation.factor(size)
     variance = float(residual @ residual) / max(size - 2 * factor, 0.5 * size)

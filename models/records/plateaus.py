@@ -110,6 +110,7 @@ def _filtered(blocks: Blocks, torque_filter: float) -> Blocks:
 
 
 def _stretches(blocks: Blocks, dwells: list[slice]) -> list[Stretch]:
+    """Torque of each dwell, block by block, with times from its start."""
     times = ((blocks.time[dwell], blocks.torque[dwell]) for dwell in dwells)
     return [Stretch(time=time - time[0], torque=torque) for time, torque in times]
 
@@ -157,6 +158,7 @@ def _used(blocks: Blocks, dwell: slice, drop: float) -> slice:
 
 
 def _mean(channel: FloatArray, dwells: list[slice]) -> FloatArray:
+    """Mean [d] of a channel over each dwell."""
     return np.array([channel[dwell].mean() for dwell in dwells])
 
 

@@ -207,7 +207,7 @@ def pointwise(
     where, sd = _disturbed(prior, points.size, history)
     if where.size == 0:
         return sums, Terms(where=where, sd=sd, rows=np.zeros((0, 3, 0)))
-    rows = _eliminated(z, y, r.take(where, axis=1), rb.take(where, axis=1), sd)
+    rows = _factors_of_terms(z, y, r.take(where, axis=1), rb.take(where, axis=1), sd)
     terms = Terms(where=where, sd=sd, rows=rows)
     return _without(sums, terms), terms
 
@@ -448,8 +448,9 @@ def _disturbed(prior: TrackPrior, size: FloatArray, history: History) -> tuple[N
     return where, column_sds(prior, size[where], history).T
 
 
-def _eliminated(z: FloatArray, y: FloatArray, r: FloatArray, rb: FloatArray, sd: FloatArray) -> FloatArray:
-    """`Terms.rows` from Z [t, p], y [t], r and r b [t, j], and σ [p, j]."""
+def _factors_of_terms(z: FloatArray, y: FloatArray, r: FloatArray, rb: FloatArray, sd: FloatArray) -> FloatArray:
+    """Cholesky factors `Terms.rows` [p, p + 3, j] of the further terms, from their design matrix Z [t, p], the values y
+    [t], the precisions r and r b [t, j] at j points, and the terms' prior deviations σ [p, j]."""
     terms = z.shape[1]
     rows = np.empty((terms, terms + 3, sd.shape[1]))
     for k in range(terms):
@@ -462,7 +463,8 @@ def _eliminated(z: FloatArray, y: FloatArray, r: FloatArray, rb: FloatArray, sd:
 
 
 def _factored(rows: FloatArray, sd: FloatArray) -> FloatArray:
-    """`Terms.rows` from ZᵀRZ (its upper triangle) with ZᵀR of (1, y, b) beside it [p, p + 3, j], and σ [p, j]; in place."""
+    """Cholesky factors `Terms.rows` from ZᵀRZ (its upper triangle) with ZᵀR of (1, y, b) beside it [p, p + 3, j], and σ
+    [p, j]; computed in place."""
     terms = rows.shape[0]
     for k in range(terms):  # M = I + σZᵀRZσ
         rows[k, k:terms] *= sd[k:]

@@ -100,8 +100,9 @@ class LawForm:
     def _share(
         self, coefficients: bytes, velocity: Same[FloatArray], pressure: Same[FloatArray], cycles: Same[FloatArray]
     ) -> FloatArray:
+        """`share`, with the coefficients as bytes and the arrays compared by identity, so that it can be cached."""
         moved, alone, factors = self._beside_speed(coefficients, pressure, cycles)
-        over_speed = _between(self._tables(coefficients)[0], self._speed_position(velocity.value, moved))
+        over_speed = _interpolated_columns(self._tables(coefficients)[0], self._speed_position(velocity.value, moved))
         return np.asarray(alone + np.einsum("nk,nk->n", over_speed, factors), dtype=np.float64)
 
     @lru_cache(maxsize=8)  # noqa: B019 - as below
@@ -113,10 +114,10 @@ class LawForm:
         h''."""
         moved, high, gone = self._places(pressure, cycles)
         _, over_pressure, over_life = self._tables(coefficients)
-        of_pressure = _between(over_pressure, high)
+        of_pressure = _interpolated_columns(over_pressure, high)
         by_life = [_CHANGES * gone] if self._of_life else []
         factors = np.stack([np.ones_like(gone), *of_pressure[:, 1:].T, *by_life], axis=1)
-        return moved, of_pressure[:, 0] + _at(gone, over_life), factors
+        return moved, of_pressure[:, 0] + _interpolated(gone, over_life), factors
 
     @lru_cache(maxsize=8)  # noqa: B019 - the few points of a campaign, at which effects are tried over and over
     def _places(
@@ -127,7 +128,11 @@ class LawForm:
         high = (pressure.value - self.lowest) / max(self.highest - self.lowest, 1e-300)
         high = np.clip((high + MARGIN) / (1.0 + 2.0 * MARGIN), 0.0, 1.0)
         gone = np.sqrt(np.clip((cycles.value - self.first) / max(self.last - self.first, 1.0), 0.0, 1.0))
-        return np.exp(-_at(high, self.moved_by_pressure) - _at(gone, self.moved_by_life)), high, gone
+        return (
+            np.exp(-_interpolated(high, self.moved_by_pressure) - _interpolated(gone, self.moved_by_life)),
+            high,
+            gone,
+        )
 
     def _speed_position(self, velocity: FloatArray, moved: FloatArray) -> FloatArray:
         """Positions [n] of velocities [n] m/s along ln v: 0 at the slowest, 1 at the fastest that was measured, after
@@ -165,10 +170,12 @@ class LawForm:
 
     @property
     def _of_pressure(self) -> int:
+        """Number of waves over pressure."""
         return min(self.pressures - 1, _PRESSURES)
 
     @property
     def _of_life(self) -> int:
+        """Number of waves over life."""
         return min(self.states - 1, _LIVES)
 
 
@@ -184,7 +191,7 @@ class LearnedLaw:
         return self.form.share(self.coefficients, velocity, pressure, cycles)
 
 
-def _between(table: FloatArray, unit: FloatArray) -> FloatArray:
+def _interpolated_columns(table: FloatArray, unit: FloatArray) -> FloatArray:
     """Columns [n, m] of a table at positions within 0 ... 1, by linear interpolation between its nodes."""
     place = unit * (_NODES.size - 1)
     before = np.minimum(place.astype(np.intp), _NODES.size - 2)
@@ -192,7 +199,7 @@ def _between(table: FloatArray, unit: FloatArray) -> FloatArray:
     return np.asarray(table[before] * (1.0 - left) + table[before + 1] * left)
 
 
-def _at(unit: FloatArray, nodes: Sequence[float] | FloatArray) -> FloatArray:
+def _interpolated(unit: FloatArray, nodes: Sequence[float] | FloatArray) -> FloatArray:
     """Linear interpolation [n], at positions within 0 ... 1, of values at evenly spaced nodes over 0 ... 1."""
     return np.interp(unit, np.linspace(0.0, 1.0, len(nodes)), nodes)
 

@@ -87,6 +87,7 @@ def _parameter_scaled(parameter: str) -> Callable[[Scene, float, Shape], FloatAr
 
 
 def _factor(amplitude: float) -> float:
+    """Factor 1 + a, kept above 0.05."""
     return max(1.0 + amplitude, 0.05)  # a fit may try what is no speed
 
 

@@ -148,10 +148,12 @@ OFFSET_POWERS = (0.5, 0.7, 0.85, 1.0, 1.2, 1.5, 2.0, 2.8)
 
 
 def _pressure_offset_grid(facts: Facts) -> tuple[Tried, ...]:
+    """Shapes of an offset for the search: those of `_offsets`, and growing with a power of the life."""
     return _offsets(facts, [(OFFSET_GROWING, 0.0, math.log(power)) for power in CREEPS])
 
 
 def _pressure_offset_courses(facts: Facts) -> tuple[Tried, ...]:
+    """Shapes under which an offset's size is estimated: with more powers, and with courses that flatten."""
     growing = [(OFFSET_GROWING, 0.0, math.log(power)) for power in OFFSET_POWERS]
     return _offsets(facts, [*growing, *((OFFSET_SETTLING, share, 0.0) for share in FLATTENED)])
 

@@ -64,6 +64,7 @@ def log_viscosity_ratio(temperature: FloatArray, reference: float, oil: Oil) -> 
 
 @lru_cache(maxsize=8)  # the few points of a campaign, at which effects are tried over and over
 def _log_viscosity_ratio(temperature: Same[FloatArray], reference: float, oil: Oil) -> FloatArray:
+    """ln(ν(T)/ν(reference)) [n] of the oil at temperatures T [n] K; 0 where T was not measured."""
     measured = np.where(np.isfinite(temperature.value), temperature.value, reference)
     return np.asarray(np.log(viscosity(measured, oil) / viscosity(np.array([reference]), oil)), dtype=np.float64)
 
@@ -77,12 +78,14 @@ AT_ONCE, STARTS = math.log(0.3), (math.log(1.0), math.log(15.0))
 
 
 def _oil_temperature_grid(facts: Facts) -> tuple[Tried, ...]:
+    """Shapes (share of the Stribeck velocity, ln of the film's settling time [s]); none without a thermometer."""
     shares = (HERSEY, -1.0, 0.0, 0.5, 1.0) if facts.temperature_measured else ()
     return tuple(Tried(shape=(share, late)) for share in shares for late in STARTS)
 
 
 @lru_cache(maxsize=8)  # the laws change about a film more often than its settling time does
 def _film(log_viscosity: Same[FloatArray], points: Same[Points], settling: float) -> FloatArray:
+    """The film's log viscosity [P], which follows the oil's with a time constant [s] (`followed`)."""
     return followed(log_viscosity.value, points.value, settling)
 
 

@@ -40,7 +40,7 @@ class CandidateDistances:
         self._law = _noise_law(problem, fits[0].torque)
         self._measured = self._grams(problem, [fit.prediction for fit in fits])
 
-    def ahead(self, added: Design) -> list[Gram]:
+    def grams_of(self, added: Design) -> list[Gram]:
         """Gram matrices of rows to come, one for each candidate as the alternative that has to imitate the others."""
         predictions = [predict(added, fit.laws) for fit in self._fits]
         # rows to come have the noise of those measured at their torque

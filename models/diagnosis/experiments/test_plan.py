@@ -186,7 +186,7 @@ def trials_of(campaign: Campaign, design: Design, distances: CandidateDistances)
         if not trial.parts and possible and (design.loops > 0 or not trial.loops):
             added = _added(campaign, design, key)
             if added is not None:
-                single[key] = [distances.ahead(added)] * trial.times
+                single[key] = [distances.grams_of(added)] * trial.times
     trials = {}
     for key, trial in TRIALS.items():
         parts = trial.parts or (key,)
@@ -210,7 +210,7 @@ def _thermometer(campaign: Campaign, problem: FitProblem, fits: Sequence[PooledF
     effect = OIL_TEMPERATURE
     usual = replace(fits[0], effects=(FittedEffect(effect=effect, amplitude=effect.prior_sd, shape=(0.0, AT_ONCE)),))
     distances = CandidateDistances(problem, (usual, bare(fits[0])))
-    nats = float(distances.distances([distances.ahead(added)])[0, 1])
+    nats = float(distances.distances([distances.grams_of(added)])[0, 1])
     test = f"{TRIALS[_WARM].text}, and oil temperature recorded from now on"
     chance = float(distinguished(np.array(nats)))
     steps = steps_of(campaign, _WARM)

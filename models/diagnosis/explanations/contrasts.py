@@ -97,10 +97,12 @@ def _ripples(design: Design, prediction: Prediction) -> FloatArray:
 
 
 def _bump(unit: FloatArray, centre: float, width: float) -> FloatArray:
+    """A Gaussian bump [n] over positions [n]."""
     return np.asarray(np.exp(-0.5 * ((unit - centre) / width) ** 2), dtype=np.float64)
 
 
 def _cosine(order: int, unit: FloatArray) -> FloatArray:
+    """cos(π k x) [n] at positions x [n], of order k."""
     return np.cos(np.pi * order * unit)
 
 

@@ -188,23 +188,23 @@ def _worst(problem: FitProblem, fitted: PooledFit) -> tuple[int | None, FloatArr
     left = left_over(problem, fitted)
     if len(problem.design.runs) < 4:
         return None, left
-    beyond, count = _beyond(problem, left)
+    excess, count = _excess_squares(problem, left)
     worst, most = (
-        int(np.argmax(beyond)),
-        0.4 * float(beyond.sum()),
+        int(np.argmax(excess)),
+        0.4 * float(excess.sum()),
     )  # this share of all error beyond noise is the others'
-    if beyond[worst] < 2.0**2 * count[worst]:  # an RMS error of so many deviations
+    if excess[worst] < 2.0**2 * count[worst]:  # an RMS error of so many deviations
         return None, left
-    if beyond.sum() - beyond[worst] <= most:
+    if excess.sum() - excess[worst] <= most:
         return worst, left
-    loud = [run for run in np.argsort(-beyond)[:_BENT_BETWEEN].tolist() if beyond[run] > _LOUD**2 * count[run]]
+    loud = [run for run in np.argsort(-excess)[:_BENT_BETWEEN].tolist() if excess[run] > _LOUD**2 * count[run]]
     without = {run: left_over(problem, fit(_left_out(problem, run), fitted.laws)) for run in loud}
-    others = {run: float(np.delete(_beyond(problem, off)[0], run).sum()) for run, off in without.items()}
+    others = {run: float(np.delete(_excess_squares(problem, off)[0], run).sum()) for run, off in without.items()}
     best = min(others, key=others.__getitem__, default=None)
     return (None, left) if best is None or others[best] > most else (best, without[best])
 
 
-def _beyond(problem: FitProblem, left: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _excess_squares(problem: FitProblem, left: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Excess sum of squares of each run [R], Σ (error/deviation)² minus its number of rows and at least 0, and that
     number [R]; `left` is the error [N] Nm."""
     of, runs = problem.design.rows.run, len(problem.design.runs)

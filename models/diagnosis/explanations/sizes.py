@@ -11,7 +11,7 @@ differently, and no data of torque show it. The draws have no f, for their torqu
 with their probability, with what may be beside them; what is left to one is nothing at work.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeAlias
 
@@ -103,8 +103,8 @@ class _Component:
 
 
 def sizes_of(problem: FitProblem, judgement: Judgement, rng: np.random.Generator) -> Sizes:
-    """Posterior sizes of a judgement's causes, and DRAWS draws or fewer of equal weight; none where nothing was
-    fitted."""
+    """Posterior of the size of each of a judgement's causes, and at most DRAWS draws of equal weight that stand for it:
+    the middle sample of each stratum of all samples in order of their change over life. None where nothing was fitted."""
     components = [
         component
         for fitted, share in _shares(judgement)
@@ -112,11 +112,42 @@ def sizes_of(problem: FitProblem, judgement: Judgement, rng: np.random.Generator
     ]
     if not components:
         return Sizes(by_slug={})
+    samples, sizes = _sampled(components, judgement.causes, rng)
+    samples += [_Sample(trend=0.0, component=0, effects=())] * (
+        criteria.SIZES_SAMPLED - len(samples)
+    )  # nothing at work
+    samples.sort(key=lambda sample: sample.trend)
+    strata = np.array_split(np.arange(len(samples)), min(criteria.DRAWS, len(samples)))
+    chosen = [samples[stratum[stratum.size // 2]] for stratum in strata]
+    return Sizes(
+        draws=tuple(
+            Draw(weight=1.0 / len(chosen), laws=components[one.component].fit.laws, effects=one.effects)
+            for one in chosen
+        ),
+        by_slug={slug: _size(np.array(sizes[slug])) for slug in sizes if slug in judgement.causes},
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Sample:
+    """One sample of a component, by its index: the named causes' effects, and what all effects change [Nm] between the
+    first state and the last."""
+
+    trend: float
+    component: int
+    effects: tuple[FittedEffect, ...]
+
+
+def _sampled(
+    components: Sequence[_Component], causes: Collection[str], rng: np.random.Generator
+) -> tuple[list[_Sample], dict[str, list[float]]]:
+    """Samples of the components, as many of each as its weight times SIZES_SAMPLED, and the sampled sizes of each effect
+    by slug, with the error e^(f z) of a template's form."""
     weight = np.array([component.weight for component in components])
     counts = np.diff(np.floor(np.cumsum(weight) * criteria.SIZES_SAMPLED + rng.random()), prepend=0.0).astype(int)
     width = max(component.mean.size for component in components)
-    samples: list[tuple[float, int, tuple[FittedEffect, ...]]] = []
-    sized: dict[str, list[float]] = {}
+    samples: list[_Sample] = []
+    sizes: dict[str, list[float]] = {}
     for index, (component, count) in enumerate(zip(components, counts.tolist(), strict=True)):
         offs = component.mean + rng.standard_normal((count, width))[:, : component.mean.size] @ component.root.T
         trends = component.trend[0] + offs @ component.trend[1]
@@ -125,20 +156,10 @@ def sizes_of(problem: FitProblem, judgement: Judgement, rng: np.random.Generator
             for effect, size in zip(effects, component.sizes(effects), strict=True):
                 form = float(np.exp(criteria.SIZE_FORM * rng.standard_normal()))
                 possible = float(np.clip(size * form, effect.effect.lowest, effect.effect.highest))
-                sized.setdefault(effect.effect.slug, []).append(possible)
-            named = tuple(effect for effect in effects if effect.effect.slug in judgement.causes)
-            samples.append((trend, index, named))
-    samples += [(0.0, 0, ())] * (criteria.SIZES_SAMPLED - len(samples))  # nothing at work
-    samples.sort(key=lambda sample: sample[0])
-    strata = np.array_split(np.arange(len(samples)), min(criteria.DRAWS, len(samples)))
-    chosen = [samples[stratum[stratum.size // 2]] for stratum in strata]
-    return Sizes(
-        draws=tuple(
-            Draw(weight=1.0 / len(chosen), laws=components[index].fit.laws, effects=effects)
-            for _, index, effects in chosen
-        ),
-        by_slug={slug: _size(np.array(sizes)) for slug, sizes in sized.items() if slug in judgement.causes},
-    )
+                sizes.setdefault(effect.effect.slug, []).append(possible)
+            named = tuple(effect for effect in effects if effect.effect.slug in causes)
+            samples.append(_Sample(trend=trend, component=index, effects=named))
+    return samples, sizes
 
 
 def _shares(judgement: Judgement) -> list[tuple[PooledFit, float]]:

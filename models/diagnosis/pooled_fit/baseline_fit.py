@@ -281,6 +281,7 @@ def _require_weights(problem: FitProblem, fitted: PooledFit) -> None:
 
 
 def _best_of(problem: FitProblem, starts: Sequence[Laws], steps: int) -> PooledFit:
+    """The fit of least cost among those from all starts."""
     return min((fit(problem, laws, steps=steps) for laws in starts), key=lambda fitted: fitted.cost)
 
 

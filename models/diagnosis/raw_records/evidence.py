@@ -112,6 +112,8 @@ def _fixed_line(records: list[WhitenedRecord], order: Line | None) -> tuple[Line
 
 
 def _line_evidence(effect: str, line: Line, name: str, note: str) -> RawEvidence:
+    """The evidence of an effect from a line, with the standard deviation of its amplitude from the curvature of log
+    L."""
     # λ goes with A², so log L near its maximum has a curvature of about 4 log L / A²
     deviation = line.amplitude / max(2.0 * math.sqrt(max(line.peak, 0.0)), 1.0)
     estimate = AmplitudeEstimate(name=name, value=line.amplitude, sd=deviation, unit="Nm", one_sided=True)

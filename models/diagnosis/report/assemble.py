@@ -108,6 +108,7 @@ def with_signs(explanations: Iterable[Explanation], candidates: Iterable[Candida
 
 
 def _finite(value: float) -> float:
+    """The value, held within ±1e300, for JSON has no infinity."""
     return float(np.clip(value, -1e300, 1e300))
 
 

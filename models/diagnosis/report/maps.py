@@ -119,4 +119,5 @@ def loop_traces(baseline: Baseline, problem: FitProblem, extended: PooledFit) ->
 
 
 def _spread(values: FloatArray) -> FloatArray:
+    """SHOWN of the ascending values or fewer, evenly, the first and the last included."""
     return np.asarray(values[np.unique(np.linspace(0, values.size - 1, SHOWN).round().astype(int))])

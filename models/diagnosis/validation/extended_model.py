@@ -82,6 +82,7 @@ def _along(design: Design, axis: str) -> list[Effect]:
 
 
 def _harmonic(points: Points, k: int, wave: Callable[[FloatArray], FloatArray]) -> FloatArray:
+    """A wave [P] of k times the loop's phase; 0 at plateaus."""
     return np.where(points.steady, 0.0, wave(k * points.phase))
 
 

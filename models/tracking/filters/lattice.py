@@ -402,4 +402,5 @@ def _tempered(log_mass: FloatArray, count: int) -> tuple[NDArray[np.intp], Float
 
 
 def _name(form: int, outlying: FloatArray) -> bytes:
+    """A form with its set of outlying runs, as a key."""
     return np.append(outlying, form).tobytes()

@@ -133,6 +133,7 @@ def log_likelihood_of(history: History, prior: TrackPrior, cloud: Cloud) -> Floa
 
 
 def _log_prior(prior: TrackPrior, cloud: Cloud) -> FloatArray:
+    """Log prior density [n] of the particles: of the coefficients, the forms and the outlying runs."""
     flat = prior.log_density(*cloud.points.T) + log_form_weight(prior)[cloud.form.astype(np.intp)]
     return np.asarray(flat + log_outlying(prior, cloud.outlying.T))
 
@@ -181,6 +182,7 @@ class ParticleState:
 
 
 def _flags(arrays: dict[str, Any]) -> dict[str, NDArray[np.bool_]]:
+    """The outlier flags of stored arrays, as booleans."""
     return {"outlying": np.asarray(arrays["outlying"], dtype=bool)}
 
 

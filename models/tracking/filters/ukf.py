@@ -130,16 +130,13 @@ class Ukf:
         return UkfState(particles=self.particle.update(state.particles, measurement, rng), normals=Normals.none())
 
     def posterior(self, state: UkfState, size: int, rng: np.random.Generator) -> TrackPosterior:
-        """`size` evenly spread draws from the normals, of equal weight, those left out whose course would have ended before
-        the last measurement. Where those are more than a tenth, or there are no normals, draws of the particles."""
+        """`size` evenly spread draws from the normals, all of equal weight but those whose course would have ended before
+        the last measurement, which have none. Where those are more than a tenth, or there are no normals, draws of the
+        particles."""
         normals, prior, history = state.normals, state.prior, state.history
         if normals.form.size == 0:
             return self.particle.posterior(state.particles, size, rng)
-        kind = systematic(normals.weight, size, float(rng.random()))
-        spread = spread_normals(size, rng.random(5))
-        spread = np.column_stack([spread, rng.standard_normal((size, normals.mean.shape[1] - spread.shape[1]))])
-        root = np.linalg.cholesky(normals.covariance)
-        rows = unscaled(prior, normals.mean[kind] + np.einsum("nij,nj->ni", root[kind], spread))
+        kind, rows = _drawn_states(prior, normals, size, rng)
         initial, at_reference, place, log_exponent, delta, slope, log_scatter, *steps = rows.T
         form = normals.form.astype(np.intp)[kind]
         scale, exponent = coefficients(place, log_exponent, FORM_COURSE[form], normals.reference)
@@ -161,6 +158,17 @@ class Ukf:
             proportional=FORM_PROPORTIONAL[form],
             discrepancy=drawn(history, prior, FORM_SIZE[form], terms, worn, rng),
         )
+
+
+def _drawn_states(
+    prior: TrackPrior, normals: Normals, size: int, rng: np.random.Generator
+) -> tuple[NDArray[np.intp], FloatArray]:
+    """`size` evenly spread draws from the mixture of normals: which normal each is of [size], and its state [size, n]."""
+    kind = systematic(normals.weight, size, float(rng.random()))
+    spread = spread_normals(size, rng.random(5))
+    spread = np.column_stack([spread, rng.standard_normal((size, normals.mean.shape[1] - spread.shape[1]))])
+    root = np.linalg.cholesky(normals.covariance)
+    return kind, unscaled(prior, normals.mean[kind] + np.einsum("nij,nj->ni", root[kind], spread))
 
 
 def stepped(entered: Entered) -> Normals:
