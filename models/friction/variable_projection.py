@@ -148,7 +148,8 @@ def profile(problem: ProjectionProblem, log_velocity: FloatArray) -> VelocityPro
 def _fewer_columns(
     problem: ProjectionProblem, curve: NDArray[np.intp], z: FloatArray, linear: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """The best of no, one and two columns for M cases z [M, n] of curve [M]: coefficients [M, 3], residual [M]."""
+    """Coefficients [M, 3] and sum of squared residuals [M] of the best fit with two columns, one or none, for M cases z
+    [M, n] of curves [M]."""
     weight, torque = problem.weight[curve], problem.torque[curve]
     alpha, beta, delta = linear.T[..., None]
     x = np.empty((3, *z.shape))
@@ -188,7 +189,10 @@ def _best_set(y: FloatArray, cosine: FloatArray) -> FloatArray:
 def _three_columns(
     problem: ProjectionProblem, z: FloatArray, peak: FloatArray
 ) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
-    """Least squares with all three columns, its residual summed as such, and where it is usable and not negative."""
+    """Coefficients [P, K, 3] of the least-squares fit with all three columns, its sum of squared residuals [P, K], and a
+    mask [P, K] of the fits whose columns are independent and whose coefficients are not negative.
+
+    The squares are those of the residual itself, for differences of large sums would lose its digits."""
     along = z @ problem.basis
     r11, r12, r22 = problem.triangle.T[:, :, None]
     off = along @ problem.basis.swapaxes(1, 2)

@@ -537,23 +537,15 @@ class _Weighed:
         return {i: slips[1] - slips[0] for i in questioned if (slips := self.weigh(i)) is not None}
 
     def moves(self) -> Iterator[tuple[Belief, float]]:
-        """Single changes of the belief, each with the approximate gain in log probability."""
+        """Beliefs that differ from this one by one run (slipped, outlying, or at a new level), each with the approximate
+        gain in log probability [nats]."""
         belief = self.belief
         for i, log_odds in self.log_odds.items():
-            gain = -log_odds if i in belief.slipped else log_odds
-            yield belief.turned(i), gain
+            yield belief.turned(i), -log_odds if i in belief.slipped else log_odds
         for fit, fitted_tests in self.fits:
             if not fitted_tests:
                 continue
-            mean, variance, log_weight = fit.without
-            off = fit.tests.log_cof - mean
-            sign = np.array([-1.0 if i in belief.outlying else 1.0 for i in fitted_tests])
-            now, then = (
-                np.logaddexp.reduce(log_weight + log_normal(off, variance + more * criteria.OUTLYING_SD**2), axis=0)
-                for more in (0.0, sign)
-            )
-            turned = then - now + sign * _log_odds(criteria.OUTLYING_SHARE)
-            for i, gain in zip(fitted_tests, turned.tolist(), strict=True):
+            for i, gain in zip(fitted_tests, self._outlier_gains(fit, fitted_tests), strict=True):
                 if gain > _WORTH:
                     yield replace(belief, outlying=belief.outlying ^ {i}), gain
             gains = fit.log_step_gains()
@@ -561,6 +553,19 @@ class _Weighed:
                 i = fitted_tests[k]
                 if i not in belief.levels and fit.tests.cycles[k] > fit.tests.cycles.min():
                     yield replace(belief, levels=belief.levels | {i}), float(gains[k]) + self._log_level(i)
+
+    def _outlier_gains(self, fit: CourseFit, fitted_tests: Sequence[int]) -> list[float]:
+        """Gain in log probability [nats] by each of a life's tests if it becomes outlying, or sound where it is outlying
+        now."""
+        mean, variance, log_weight = fit.without
+        off = fit.tests.log_cof - mean
+        sign = np.array([-1.0 if i in self.belief.outlying else 1.0 for i in fitted_tests])
+        now, then = (
+            np.logaddexp.reduce(log_weight + log_normal(off, variance + more * criteria.OUTLYING_SD**2), axis=0)
+            for more in (0.0, sign)
+        )
+        gains = then - now + sign * _log_odds(criteria.OUTLYING_SHARE)
+        return [float(gain) for gain in gains]
 
     def instead(self) -> Iterator[Belief]:
         """Beliefs with a slip in place of an outlier or new level at the latest test of a life."""

@@ -55,11 +55,12 @@ def roundness(cycles: FloatArray | float, scale: FloatArray | float) -> FloatArr
 def log_anywhere(cycles: FloatArray | float) -> FloatArray:
     """Log density of a number of cycles of which nothing is known, any shape: log-uniform except for round numbers, and
     falling beyond the usual life of clutches."""
-    return np.asarray(_log_of_any(cycles) + np.log(roundness(cycles, cycles)))
+    return np.asarray(_log_uninformed(cycles) + np.log(roundness(cycles, cycles)))
 
 
-def _log_of_any(cycles: FloatArray | float) -> FloatArray:
-    """Log density of any cycles if no number is round; 0.7 is the deviation of the logarithm beyond MAX_CYCLES."""
+def _log_uninformed(cycles: FloatArray | float) -> FloatArray:
+    """Log density of a number of cycles of which nothing is known, round numbers not preferred: log-uniform between 10
+    and 1e8 cycles, times a normal of deviation 0.7 in the logarithm beyond MAX_CYCLES."""
     at = np.maximum(cycles, 1.0)
     beyond = np.maximum(np.log(at / criteria.MAX_CYCLES), 0.0) / 0.7
     return np.asarray(-np.log(at * math.log(1e8 / 1e1)) - 0.5 * beyond**2)
@@ -136,7 +137,7 @@ def _anywhere_in_life(finite: FloatArray) -> FloatArray:
     latest = np.where(finite >= ordered[:, -1:], ordered[:, -2:-1] if finite.shape[1] > 1 else 0.0, ordered[:, -1:])
     share = np.where(finite <= latest, criteria.WITHIN, np.where(finite <= 2.0 * latest, criteria.BEYOND, 0.0))
     remaining_share = np.where(latest >= 1.0, 1.0 - criteria.WITHIN - criteria.BEYOND, 1.0)
-    return np.asarray(share / np.maximum(latest, 1.0) + remaining_share * np.exp(_log_of_any(finite)))
+    return np.asarray(share / np.maximum(latest, 1.0) + remaining_share * np.exp(_log_uninformed(finite)))
 
 
 def _by_gaps(cycles: FloatArray) -> FloatArray:
@@ -148,7 +149,7 @@ def _by_gaps(cycles: FloatArray) -> FloatArray:
         gaps = np.diff(ascending, axis=1)
     gaps = np.where(np.isfinite(gaps), gaps, 0.0)
     round_by = roundness(ascending, np.concatenate([first, gaps], axis=1))
-    of_first = (1.0 - criteria.AT_START) * np.exp(_log_of_any(first)) * round_by[:, :1]
+    of_first = (1.0 - criteria.AT_START) * np.exp(_log_uninformed(first)) * round_by[:, :1]
     law = np.concatenate([criteria.AT_START * (first < 0.5) + of_first, _of_gaps(gaps, round_by[:, 1:])], axis=1)
     back = np.empty(law.shape)
     np.put_along_axis(back, order, law, axis=1)
@@ -157,15 +158,10 @@ def _by_gaps(cycles: FloatArray) -> FloatArray:
 
 def _of_gaps(gaps: FloatArray, round_by: FloatArray) -> FloatArray:
     """Probability p [h, k] of gaps [h, k] given the gaps before each, times the roundness `round_by` [h, k] of the
-    cycles at their ends."""
-    sets, count = gaps.shape
-    padded = np.concatenate([np.zeros((sets, criteria.MEMORY)), gaps], axis=1)
-    places = np.arange(count)[:, None] + criteria.MEMORY - 1 - np.arange(criteria.MEMORY)
-    before = padded[:, places]  # [h, k, memory], the last one first
+    cycles at their ends: a mixture of the same gap as before, a similar one, one that goes on growing, one of the same
+    order, and any."""
+    before, weight = _gaps_before(gaps)
     present = before >= 0.5
-    weight = present * _RECENCY
-    total = weight.sum(axis=2, keepdims=True)
-    weight = weight / np.maximum(total, 1e-12)
     log_gap = np.log(np.maximum(gaps, 0.5))
     log_before = np.log(np.maximum(before, 0.5))
     same = (weight * (np.abs(before - gaps[:, :, None]) < 0.5)).sum(axis=2)
@@ -175,12 +171,23 @@ def _of_gaps(gaps: FloatArray, round_by: FloatArray) -> FloatArray:
     further = _log_normal(log_gap, grown, criteria.LIKE_GAP_SD)
     like = np.where(growing, (1.0 - criteria.GROWING) * like + criteria.GROWING * further, like)
     similar = _log_normal(log_gap, (weight * log_before).sum(axis=2), 1.5)  # of their order
-    anything = np.exp(_log_of_any(gaps))
+    anything = np.exp(_log_uninformed(gaps))
     remaining_share = 1.0 - criteria.SAME_GAP - criteria.LIKE_GAP - criteria.SIMILAR_GAP
     spread = criteria.LIKE_GAP * like + criteria.SIMILAR_GAP * similar + remaining_share * anything
-    earlier = total[:, :, 0] > 0
+    earlier = present.any(axis=2)
     law = criteria.SAME_GAP * same + np.minimum(round_by * np.where(earlier, spread, anything), 1.0 - criteria.SAME_GAP)
     return np.where(gaps < 0.5, 0.02, law)  # it repeats another of its kind
+
+
+def _gaps_before(gaps: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """The MEMORY gaps before each gap [h, k, memory], the last one first and 0 where there is none, and their weights,
+    which fall with their age and sum to one."""
+    sets, count = gaps.shape
+    padded = np.concatenate([np.zeros((sets, criteria.MEMORY)), gaps], axis=1)
+    places = np.arange(count)[:, None] + criteria.MEMORY - 1 - np.arange(criteria.MEMORY)
+    before = padded[:, places]
+    weight = (before >= 0.5) * _RECENCY
+    return before, weight / np.maximum(weight.sum(axis=2, keepdims=True), 1e-12)
 
 
 def _log_normal(log_gap: FloatArray, centre: FloatArray, deviation: float) -> FloatArray:

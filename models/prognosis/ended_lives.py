@@ -413,15 +413,28 @@ class _Nodes:
         deviation [m], and the nodes' shares of the evidence [m]. `pace` [j] is the slope of every course at its end,
         `wander` [k] the deviation of the logarithm where all of the life is to come.
 
-        Given the tests the damage at a node's end is 1 + `beyond`, with variance `spread`. Along the slope p it is 1 at the
-        share 1 - beyond/p of that end: log ζ = log end + ln(1 - beyond/p).
+        Where the damage at a node's end is 1 + x, it is 1 at the share 1 - x/p of that end along the slope p: log ζ =
+        log end + ln(1 - x/p).
         """
         share = np.exp(self.log_evidence - self.log_evidence.max()).ravel()
         order = np.argsort(share)[::-1]
         within = np.cumsum(share[order])
-        # those that hold nearly all of it are led on
         nodes_kept = order[: int(np.searchsorted(within, 0.999 * within[-1])) + 1]
         e, k, j = np.unravel_index(nodes_kept, self.log_evidence.shape)
+        beyond, spread = self._damage_at_end(decline, log_end, (e, k, j))
+        farthest = 3.0  # a course crosses the threshold at most so much later than its end [T]
+        early = np.clip(beyond / pace[j], -farthest, 1.0 - 1.0 / (1.0 + farthest))
+        to_come = np.maximum(1.0 - as_of / np.exp(log_end[e]), 0.0)
+        step = (log_end[1] - log_end[0]) / math.sqrt(12.0)
+        deviation = np.sqrt(spread / np.square(pace[j]) + np.square(wander[k] * to_come**1.5) + step**2)
+        return log_end[e] + np.log1p(-early), deviation, share[nodes_kept] / share[nodes_kept].sum()
+
+    def _damage_at_end(
+        self, decline: _Decline, log_end: FloatArray, nodes: tuple[NDArray[np.intp], ...]
+    ) -> tuple[FloatArray, FloatArray]:
+        """Mean, less 1, and variance [m] of the damage at the end of each of the nodes [m], given the tests: of the
+        course's size and the features, and of δ led on from the tests to that end."""
+        e, k, j = nodes
         end, weight, variance = np.exp(log_end[e]), self.weight[e, k], np.square(self.size[e, k])
         ahead = np.maximum(end / decline.span, 1.0)
         across = _walked(decline.progress / decline.span, ahead[:, None]) @ decline.turn
@@ -429,13 +442,7 @@ class _Nodes:
         left = decline.damage - features @ decline.features.T - (1.0 + taller)[:, None] * self.courses[e, :, j]
         beyond = taller + features @ decline.sizes + variance * (across * weight * left).sum(axis=1)
         spread = variance * ahead**3 - np.square(variance) * (np.square(across) * weight).sum(axis=1)
-        spread = np.maximum(spread, 0.0) + self.taller_variance[e, k, j]
-        farthest = 3.0  # a course crosses the threshold at most so much later than its end [T]
-        early = np.clip(beyond / pace[j], -farthest, 1.0 - 1.0 / (1.0 + farthest))
-        to_come = np.maximum(1.0 - as_of / end, 0.0)
-        step = (log_end[1] - log_end[0]) / math.sqrt(12.0)
-        deviation = np.sqrt(spread / np.square(pace[j]) + np.square(wander[k] * to_come**1.5) + step**2)
-        return log_end[e] + np.log1p(-early), deviation, share[nodes_kept] / share[nodes_kept].sum()
+        return beyond, np.maximum(spread, 0.0) + self.taller_variance[e, k, j]
 
 
 def _walked(early: FloatArray, late: FloatArray) -> FloatArray:

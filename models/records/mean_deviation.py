@@ -119,11 +119,9 @@ class DwellAutocorrelation:
         return max(float(1 + 2 * (np.maximum(1 - lag / count, 0.0) * self.lags).sum()), 0.2)
 
 
-def pooled_correlation(residuals: Sequence[FloatArray], removed: int) -> DwellAutocorrelation:
-    """Autocorrelation ρ of all residuals together, corrected for the `removed` coefficients of low frequency that were
-    fitted to each."""
-    length = float(np.median([residual.size for residual in residuals]))
-    longest = max(1, min(400, int(criteria.LOST_SHARE * length / (2 * removed))))  # averages
+def _pooled_autocovariance(residuals: Sequence[FloatArray], longest: int) -> FloatArray | None:
+    """Autocovariance [longest + 1] of residuals of unit variance at lags 0 ... longest, over all residuals that are longer
+    than that; None where there are none."""
     total, count = np.zeros(longest + 1), np.zeros(longest + 1)
     for residual in residuals:
         power = float(residual @ residual)
@@ -133,9 +131,17 @@ def pooled_correlation(residuals: Sequence[FloatArray], removed: int) -> DwellAu
         products = np.fft.irfft(padded.real**2 + padded.imag**2)[: longest + 1]
         total += products * (residual.size / power)
         count += residual.size - np.arange(longest + 1)
-    if count[0] == 0.0:
+    return None if count[0] == 0.0 else total / count
+
+
+def pooled_correlation(residuals: Sequence[FloatArray], removed: int) -> DwellAutocorrelation:
+    """Autocorrelation ρ of all residuals together, corrected for the `removed` coefficients of low frequency that were
+    fitted to each."""
+    length = float(np.median([residual.size for residual in residuals]))
+    longest = max(1, min(400, int(criteria.LOST_SHARE * length / (2 * removed))))  # averages
+    covariance = _pooled_autocovariance(residuals, longest)
+    if covariance is None:
         return DwellAutocorrelation(lags=np.zeros(0))
-    covariance = total / count
     # What was removed takes `removed` Λ/n off every lag, Λ = γ_0 + 2 Σ γ_k being unknown: solved for each window.
     lag = np.arange(longest + 1)
     raw = covariance[0] + 2 * np.cumsum(np.where(lag > 0, covariance, 0.0))

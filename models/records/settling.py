@@ -60,7 +60,8 @@ def fit_transients(stretches: Sequence[Stretch], shortest: float) -> Transients:
     place = np.log(taus)
     common = _common(worth, gain, place)
     rows = [
-        _fit(stretch, place, worth[i], gain[i], float(long_run[i, 0]), common) for i, stretch in enumerate(stretches)
+        _fitted_transient(stretch, place, worth[i], gain[i], float(long_run[i, 0]), common)
+        for i, stretch in enumerate(stretches)
     ]
     tau, slowest, amplitude, deviation = np.array(rows).T
     return Transients(time_constant=tau, slowest=slowest, amplitude=amplitude, amplitude_sd=deviation)
@@ -134,7 +135,7 @@ def _peak(worth: FloatArray, place: FloatArray) -> tuple[float, float]:
     return float(place[best]) + 0.5 * (left - right) / curvature * step, min(step * float(np.sqrt(-2 / curvature)), 1.0)
 
 
-def _fit(
+def _fitted_transient(
     stretch: Stretch,
     place: FloatArray,
     worth: FloatArray,
@@ -142,7 +143,11 @@ def _fit(
     long_run: float,
     common: tuple[float, float] | None,
 ) -> tuple[float, float, float, float]:
-    """Time constant τ of a dwell's transient, its upper limit, the amplitude A and its standard deviation."""
+    """Time constant τ [s] of a dwell's transient and its upper limit [s], both NaN where it determines none, amplitude A
+    [Nm] and its standard deviation.
+
+    `gain` [J] and `worth` [J]: how much A alone, and A with a drift, take off the sum of squares at each ln τ of `place`
+    [J], in variances `long_run` of the noise; `common`: mean and deviation of the prior of ln τ from all dwells."""
     if common is None and gain[worth.argmax()] < criteria.OWN_GAIN:
         return np.nan, np.nan, 0.0, 0.0
     penalty = 0.0 if common is None else ((place - common[0]) / common[1]) ** 2

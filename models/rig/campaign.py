@@ -200,4 +200,5 @@ def cycles_of_tests() -> Iterator[int]:
 
 
 def _generator(seed: int, *stream: int) -> np.random.Generator:
+    """The random generator of one stream of a seed, independent of the seed's other streams."""
     return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=stream))

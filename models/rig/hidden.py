@@ -213,7 +213,7 @@ def _inertia_torque(size: float, rows: HiddenTest) -> FloatArray:
 
 @_hides("film time when new", "s", size=0.1, loops=True)
 def _squeeze_film(_: float, rows: HiddenTest) -> FloatArray:
-    """The clutch itself has the film: `clutch_for`."""
+    """No change of a test's torque [n]: the film belongs to the simulated clutch itself (`clutch_for`)."""
     return np.zeros_like(rows.held.torque)
 
 

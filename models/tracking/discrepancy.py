@@ -172,7 +172,7 @@ def _stretchwise(curvature: FloatArray, time: FloatArray) -> FloatArray:
     return np.asarray(begun.take(slope + PAST + FUTURE) + x * bent)
 
 
-def drawn(
+def drawn_discrepancy(
     history: History,
     prior: TrackPrior,
     size: FloatArray,
@@ -180,8 +180,9 @@ def drawn(
     worn: FloatArray,
     rng: np.random.Generator,
 ) -> CourseDiscrepancy:
-    """Discrepancies of n draws from their drawn past terms [n, PAST + e], in the unit of the quantity; curvature ahead
-    and knees are drawn here. `worn` [n] is the share of ξ0 worn so far."""
+    """Discrepancy δ of n draws, in the unit of the quantity: `terms` [n, PAST + e] has what the tests determined, the
+    curvature of the past stretches and the steps; curvature ahead and knees are drawn from their priors. `worn` [n] is
+    the share of ξ0 worn so far."""
     ahead = np.zeros((size.size, FUTURE))
     alive = size > 0.0
     ahead[alive] = rng.standard_normal((int(alive.sum()), FUTURE)) * (size[alive] * prior.size)[:, None]

@@ -13,7 +13,7 @@ from scipy.special import ndtri
 
 from models.arrays import FloatArray
 from models.tracking.courses import FORM_PROPORTIONAL, UNIT_OF_CHANGE, coefficients_at
-from models.tracking.discrepancy import PAST, drawn
+from models.tracking.discrepancy import PAST, drawn_discrepancy
 from models.tracking.history import History
 from models.tracking.linear_model import EvaluationPoints, Sums, Terms, drawn_pair, drawn_terms
 from models.tracking.posterior import TrackPosterior
@@ -103,5 +103,5 @@ def with_linear_terms(
         exponent=exponent,
         scatter=np.exp(points.log_scatter),
         proportional=FORM_PROPORTIONAL[points.form],
-        discrepancy=drawn(history, prior, points.size, further, worn, rng),
+        discrepancy=drawn_discrepancy(history, prior, points.size, further, worn, rng),
     )

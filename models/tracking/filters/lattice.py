@@ -203,7 +203,7 @@ def closed_in(prior: TrackPrior, history: History) -> tuple[Kinds, LatticeFrame,
     table = np.zeros((len(CourseForm), history.value.size, COARSE[1] * _FIRST))
     table[courses] = tabled(first, _FIRST, history, courses)
     blur = share * float((first.upper - first.lower).max()) / (_FIRST - 1)
-    kinds, density = _first(prior, history, first, table, blur)
+    kinds, density = _likely_kinds(prior, history, first, table, blur)
     frame = shrunk(first.taken(np.zeros(kinds.form.size, dtype=np.intp)), density).resized(*COARSE[1:])
     log_mass = log_masses(density, first.cells(_FIRST)) - kinds.log_weight
     kinds, laid = represented(prior, kinds)
@@ -238,10 +238,11 @@ def _closer(
     return shrunk(frame, density), log_masses(density, frame.cells(nodes)), blurs
 
 
-def _first(
+def _likely_kinds(
     prior: TrackPrior, history: History, frame: LatticeFrame, table: FloatArray, blur: float
 ) -> tuple[Kinds, FloatArray]:
-    """The kinds, with likely sets of outlying runs found by search, and their density on the first coarse lattice."""
+    """Kinds of every form with each likely set of outlying runs, as found by search, and their log posterior densities
+    on the first coarse lattice."""
     search, densities = OutlierSearch.begun(prior, history), {}
 
     def looked_at(outlying: FloatArray) -> FloatArray:

@@ -254,7 +254,7 @@ class Particle:
     def _renewed(self, prior: TrackPrior, history: History, cloud: Cloud, rng: np.random.Generator) -> Cloud:
         """The particles resampled, then moved by a Metropolis random walk shaped like the cloud."""
         weight, span = normalised(cloud.log_weight), history.span
-        shapes = _shapes(cloud, weight, span)
+        shapes = _covariance_roots(cloud, weight, span)
         chance, log_weight = _with_least_share(cloud.course, weight)
         index = systematic(chance, weight.size, float(rng.random()))
         cloud = replace(cloud.taken(index), log_weight=log_weight[index])
@@ -290,7 +290,7 @@ def _places(cloud: Cloud, span: float) -> FloatArray:
     return np.column_stack([place_of(cloud.points[:, 0], cloud.course, span), cloud.points[:, 1:]])
 
 
-def _shapes(cloud: Cloud, weight: FloatArray, span: float) -> FloatArray:
+def _covariance_roots(cloud: Cloud, weight: FloatArray, span: float) -> FloatArray:
     """Square roots [6, 3, 3] of the covariances of each course's particles in lattice coordinates."""
     shapes, places = np.zeros((len(CourseForm), 3, 3)), _places(cloud, span)
     for course in np.unique(cloud.course):

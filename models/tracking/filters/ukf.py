@@ -38,7 +38,7 @@ from models.tracking.courses import (
     place_of,
 )
 from models.tracking.criteria import DOMAIN, FEWEST_BEFORE, LEAST_FORM
-from models.tracking.discrepancy import PAST, columns, drawn, value_and_slope
+from models.tracking.discrepancy import PAST, columns, drawn_discrepancy, value_and_slope
 from models.tracking.filters.particle import Entered, Particle, ParticleState
 from models.tracking.history import History, span_of
 from models.tracking.linear_model import linear_moments
@@ -156,7 +156,7 @@ class Ukf:
             exponent=exponent,
             scatter=np.exp(log_scatter),
             proportional=FORM_PROPORTIONAL[form],
-            discrepancy=drawn(history, prior, FORM_SIZE[form], terms, worn, rng),
+            discrepancy=drawn_discrepancy(history, prior, FORM_SIZE[form], terms, worn, rng),
         )
 
 
