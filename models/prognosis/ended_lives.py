@@ -266,8 +266,8 @@ def _as_its_kind(
     if decline is None:
         return None
     log_ends = np.log([life.end for life in lives])
-    variance = np.array([life.deviation**2 for life in lives])
     centre = float(np.median(log_ends[exact]))
+    variance = np.array([life.deviation**2 for life in lives])
     of_ends = _predictive(log_ends - centre, variance, exact, criteria.VAGUE, criteria.END_WORTH)
     now, earliest = math.log(as_of), math.log(decline.span) - 0.2
     latest = max(float(log_ends.max()), now) + _BEYOND
@@ -284,24 +284,30 @@ def _as_its_kind(
     stated = density * np.exp(log_prior - log_prior.max()) * np.gradient(places)
     if not stated.any():
         return None
-    log_anywhere = np.linspace(earliest, earliest + _ANYWHERE, _ENDS)
-    other_nodes = decline.nodes(log_anywhere, _plain_courses(decline.progress / np.exp(log_anywhere)[:, None]))
-    step = log_end[1] - log_end[0]
-    log_prior = of_ends.log_density(log_end - centre) + math.log(step)
-    log_odds = logsumexp(kin.log_evidence + log_prior[:, None, None]) - math.log(pace.size)
-    anywhere = logsumexp(kin.log_evidence) + math.log(step / _ANYWHERE) - math.log(pace.size)
-    log_others = logsumexp(other_nodes.log_evidence) - math.log(_ENDS * other_nodes.log_evidence.shape[2])
-    log_odds -= np.logaddexp(anywhere, log_others) - math.log(2.0)
     lawful, lean = _forms(tests[0], courses)
     return Kin(
         ends=np.exp(places),
         weight=stated / stated.sum(),
-        log_odds=float(log_odds),
+        log_odds=_log_odds_of_kind(decline, kin, log_end, of_ends.log_density(log_end - centre)),
         lawful=lawful,
         lean=lean,
         predictive=of_ends,
         centre=math.exp(centre),
     )
+
+
+def _log_odds_of_kind(decline: "_Decline", kin: "_Nodes", log_end: FloatArray, log_density: FloatArray) -> float:
+    """Log odds [nats] that a life's tests belong to the kind of the ended lives: their evidence with an end from the
+    predictive density of ln ζ, `log_density` at `log_end` [e], over that with an end anywhere, on courses of the kind or
+    on plain ones, half each."""
+    log_anywhere = np.linspace(log_end[0], log_end[0] + _ANYWHERE, _ENDS)
+    plain = decline.nodes(log_anywhere, _plain_courses(decline.progress / np.exp(log_anywhere)[:, None])).log_evidence
+    step, courses = log_end[1] - log_end[0], math.log(kin.log_evidence.shape[2])
+    log_prior = log_density + math.log(step)
+    of_kind = logsumexp(kin.log_evidence + log_prior[:, None, None]) - courses
+    anywhere = logsumexp(kin.log_evidence) + math.log(step / _ANYWHERE) - courses
+    others = logsumexp(plain) - math.log(_ENDS * plain.shape[2])
+    return float(of_kind - (np.logaddexp(anywhere, others) - math.log(2.0)))
 
 
 def _forms(first: Measurement, lives: Sequence[ObservedLife]) -> tuple[float, FloatArray]:

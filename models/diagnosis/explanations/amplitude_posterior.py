@@ -107,6 +107,19 @@ class Proportional:
         return steps, logs + beyond
 
 
+def _quadrature_nodes(middle: FloatArray, precision: FloatArray, bounds: tuple[float, float]) -> FloatArray:
+    """Nodes [n], ascending within the bounds, that cover two normal densities of these means and precisions [2], closer
+    about the second one and inwards of a bound beyond which a mean lies."""
+    low, high = middle - _REACH * precision**-0.5, middle + _REACH * precision**-0.5
+    steps = np.unique([*np.linspace(low.min(), high.max(), _WIDE), *np.linspace(low[1], high[1], _NEAR)])
+    for bound, inwards in zip(bounds, (1.0, -1.0), strict=True):
+        falls = inwards * precision * (bound - middle)  # how fast both densities fall off inwards
+        if np.isfinite(bound) and (falls.max() > 0.0 or steps[0] < bound < steps[-1]):
+            ends = inwards * _REACH / np.maximum(falls, np.sqrt(precision)) * np.linspace(0.0, 1.0, _NEAR)[1:, None]
+            steps = np.concatenate([steps, [bound], (bound + ends[:, falls > 0.0]).ravel()])
+    return np.unique(steps[(steps >= bounds[0]) & (steps <= bounds[1])])
+
+
 def _along_amplitude(
     info: FloatArray, score: FloatArray, sd: FloatArray, fitted: FittedEffect
 ) -> tuple[FloatArray, FloatArray]:
@@ -118,16 +131,8 @@ def _along_amplitude(
     left = np.array([info[0, 0] - (sloped**2 / (1 + values)).sum(), info[0, 0]])
     left = np.maximum(left, fitted.effect.amplitude_precision(fitted.amplitude))
     middle = (score[0] - np.array([(sloped * fixed / (1 + values)).sum(), 0.0])) / left
-    low, high = middle - _REACH * left**-0.5, middle + _REACH * left**-0.5
-    steps = np.unique([*np.linspace(low.min(), high.max(), _WIDE), *np.linspace(low[1], high[1], _NEAR)])
-    least, most = fitted.effect.lowest - fitted.amplitude, fitted.effect.highest - fitted.amplitude
-    for bound, inwards in ((least, 1.0), (most, -1.0)):
-        # how fast both densities fall off inwards, where the data ask for what is beyond
-        falls = inwards * left * (bound - middle)
-        if np.isfinite(bound) and (falls.max() > 0.0 or steps[0] < bound < steps[-1]):
-            ends = inwards * _REACH / np.maximum(falls, np.sqrt(left)) * np.linspace(0.0, 1.0, _NEAR)[1:, None]
-            steps = np.concatenate([steps, [bound], (bound + ends[:, falls > 0.0]).ravel()])
-    steps = np.unique(steps[(steps >= least) & (steps <= most)])
+    bounds = fitted.effect.lowest - fitted.amplitude, fitted.effect.highest - fitted.amplitude
+    steps = _quadrature_nodes(middle, left, bounds)
     squared = np.square(1.0 + steps / fitted.amplitude)[:, None]
     gain = squared * np.square(fixed - sloped * steps[:, None]) / (1 + squared * values) - np.log1p(values)
     logs = score[0] * steps - 0.5 * info[0, 0] * np.square(steps) + 0.5 * gain.sum(axis=1)
