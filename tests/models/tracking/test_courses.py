@@ -14,7 +14,7 @@ from models.prognosis.first_passage import ends_of_life, predict_first_passage, 
 from models.tracking import courses, linear_model, sampling
 from models.tracking.courses import CourseForm
 from models.tracking.criteria import KNEE_HAZARD, KNEE_REACH, UNSEEN_WEAR
-from models.tracking.discrepancy import PAST, drawn, smooth
+from models.tracking.discrepancy import PAST, drawn_discrepancy, smooth
 from models.tracking.filters.grid import Grid
 from models.tracking.filters.particle import Particle
 from models.tracking.filters.ukf import Ukf
@@ -192,7 +192,7 @@ def test_knees_come_as_their_hazard_has_it_and_eq_6_alone_has_none_once_it_wears
     sizes, worn = np.repeat([0.0, 0.0, 0.03], 20_000), np.repeat([0.2, 0.05, 0.2], 20_000)
 
     def knees(history: History, prior: TrackPrior) -> FloatArray:
-        return drawn(history, prior, sizes, np.zeros((sizes.size, PAST)), worn, np.random.default_rng(4)).knee
+        return drawn_discrepancy(history, prior, sizes, np.zeros((sizes.size, PAST)), worn, np.random.default_rng(4)).knee
 
     found = knees(history, prior)
     assert np.isinf(found[:20_000]).all()
