@@ -192,7 +192,9 @@ def test_knees_come_as_their_hazard_has_it_and_eq_6_alone_has_none_once_it_wears
     sizes, worn = np.repeat([0.0, 0.0, 0.03], 20_000), np.repeat([0.2, 0.05, 0.2], 20_000)
 
     def knees(history: History, prior: TrackPrior) -> FloatArray:
-        return drawn_discrepancy(history, prior, sizes, np.zeros((sizes.size, PAST)), worn, np.random.default_rng(4)).knee
+        return drawn_discrepancy(
+            history, prior, sizes, np.zeros((sizes.size, PAST)), worn, np.random.default_rng(4)
+        ).knee
 
     found = knees(history, prior)
     assert np.isinf(found[:20_000]).all()
