@@ -11,12 +11,14 @@ from models.clutch import Geometry
 from models.diagnosis.campaign import Campaign
 from models.diagnosis.design.design import build_design
 from models.diagnosis.design.facts import facts_of
+from models.diagnosis.effects.fitted_effect import Draw, FittedEffect, ranges_of
 from models.diagnosis.effects.thermal import INTERFACE_HEATING, REFERENCE_FLUX, WHOLE, _computed, _measured
 from models.diagnosis.explanations.verdict import Verdict
+from models.diagnosis.extension import build_extension
 from models.friction.stribeck import torque
 from models.records.runs import Plateaus, Record
 from models.records.torque_filter import filtered_as_torque
-from tests.models.diagnosis.campaigns import Where, altered, campaign, look, scene_of
+from tests.models.diagnosis.campaigns import Where, altered, campaign, look, scene_of, study
 
 # --- The torque channel's own low-pass: named as a delay where it is not declared, taken off and not discovered where
 # it is.
@@ -158,10 +160,13 @@ def test_with_the_channel_it_goes_with_the_plate_and_a_thermometers_offset_is_no
         assert np.corrcoef(lost[loops], modelled[loops])[0, 1] > 0.7  # the course within a loop is the plate's own
 
 
-@pytest.mark.slow
 def test_an_adopted_model_takes_off_by_the_plate_of_a_later_test() -> None:
     given = with_plate(campaign(7, heated), RISE)
-    extension = look(given).extension
+    fitted = study(given)
+    facts = fitted.design.facts
+    heating = FittedEffect(effect=INTERFACE_HEATING, amplitude=LOSS, shape=INTERFACE_HEATING.grid(facts)[0].shape)
+    draw = Draw(weight=1.0, laws=fitted.baseline.fit.laws, effects=(heating,))
+    extension = build_extension([draw], facts, ranges_of(fitted.design.rows), courses=False)
     last = given.stationary[-1]
     warm, cold = (
         extension.artefact(replace(last, run_id="later", plateaus=plateaus), given)
