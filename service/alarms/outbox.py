@@ -58,6 +58,7 @@ class Outbox:
         self._planned: dict[int, tuple[tuple[int, str | None], float]] = {}
         self._clock = 0.0
         self._judged: set[tuple[str, str, str, str]] = set()
+        self._ahead = time.time() - time.monotonic()  # [s] of the wall clock, at the last look at it
         self._heard: dict[
             str, tuple[str, float]
         ] = {}  # by clutch its last run, and when it came by the monotonic clock
@@ -172,6 +173,8 @@ class Outbox:
 
     def _look_at_the_clock(self) -> None:
         """Raise alarms for rigs that have been silent for longer than a rule allows."""
+        ahead = time.time() - time.monotonic()
+        set_forward, self._ahead = max(0.0, ahead - self._ahead), ahead
         with self._database.reading() as connection:
             rules = [(row, raising.rule_of(row)) for row in alarms.enabled(connection)]
             rules = [(row, rule) for row, rule in rules if rule.quantity == raising.SILENT]
@@ -181,7 +184,7 @@ class Outbox:
                 return
             page = clutches.page(connection, limit=None)
             rows = [row for row in page if "damaged" not in row.summary]
-            silences = self._silences(alarms.last_heard(connection, [row.clutch_id for row in rows]))
+            silences = self._silences(alarms.last_heard(connection, [row.clutch_id for row in rows]), set_forward)
         judged = set()
         for row in rows:
             silence = silences.get(row.clutch_id)
@@ -196,15 +199,16 @@ class Outbox:
                 raising.evaluate(connection, clutch_id, silences[clutch_id])
         self._judged = judged
 
-    def _silences(self, heard: Mapping[str, str]) -> dict[str, Silence]:
+    def _silences(self, heard: Mapping[str, str], set_forward: float = 0.0) -> dict[str, Silence]:
         """The durations of silence of clutches last heard at these moments; a run that arrived since the last look
-        counts as arriving now."""
+        counts as arriving now, and of a clutch first seen now, the time [s] by which the clock was `set_forward` since
+        then counts as none."""
         now, known, self._heard = time.monotonic(), self._heard, {}
         for clutch_id, since in heard.items():
             before = known.get(clutch_id)
             if before is not None and before[0] != since:
                 before = since, now
-            self._heard[clutch_id] = before or (since, now - _seconds_since(since))
+            self._heard[clutch_id] = before or (since, now - max(0.0, _seconds_since(since) - set_forward))
         return {name: Silence(since, (now - came) / _SECONDS_PER_HOUR) for name, (since, came) in self._heard.items()}
 
 
