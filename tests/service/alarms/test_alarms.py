@@ -311,6 +311,9 @@ def test_a_wall_clock_that_is_set_makes_no_rig_silent_nor_hides_one(
     assert hours() == {"a": 4.0, "b": 0.0, "c": 0.0}
     passed += 3600.0
     assert hours() == {"a": 5.0, "b": 1.0, "c": 1.0}
+    # its run came while the clock was ten days behind, and is seen first after the clock was set right
+    stamps["d"] = (wall - timedelta(days=10)).isoformat()
+    assert round(box._silences(stamps, timedelta(days=10).total_seconds())["d"].hours, 6) == 0.0
 
 
 def test_a_kind_is_watched_as_a_whole_and_an_archived_clutch_is_not(client: TestClient) -> None:
